@@ -34,7 +34,7 @@ An environment of anything else, as one that rewards little torque::
 
 from typing import TYPE_CHECKING, Any
 
-from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, shown
 from orchestration.foundation.basics.extras import explains_missing
 
 if TYPE_CHECKING:
@@ -76,8 +76,11 @@ def _flight(settings: dict[str, Any]) -> dict[str, Any]:
     """The arguments of an environment of the flight: the defaults that are not given."""
     from orchestration.quadrotor.scenarios.scenario import Scenario
 
+    scenario = settings.pop("scenario", None) or Scenario()
+    if not isinstance(scenario, Scenario):
+        raise UsageError(f"scenario = {shown(repr(scenario))}: expected a Scenario")
     flight = {
-        "request": _fastest(settings.pop("scenario", None) or Scenario()),
+        "request": _fastest(scenario),
         "reward": nearness,
         "low": [0.0, -5.0, -5.0, -5.0],
         "high": [30.0, 5.0, 5.0, 5.0],

@@ -182,6 +182,8 @@ def test_what_cannot_be_is_refused_in_a_line_in_lanes_too() -> None:
             many.step(wrong)
     with pytest.raises(UsageError, match=r"^reward: returned shape \(\); expected a number for each of 2$"):
         many.step(np.zeros((2, 4)))
+    with pytest.raises(UsageError, match=r"^scenario = 'paper': expected a Scenario$"):
+        gymnasium.make("quadcosim/Quadrotor-v0", scenario="paper")
     with pytest.raises(UsageError, match=r"^there is no plant.mas"):
         many.runs.value("plant.mas")
     with pytest.raises(UsageError, match=r"plant.initial.position.w: QuadrotorPlant has no such variable"):
