@@ -60,6 +60,21 @@ def test_the_derivatives_are_those_of_the_motion_in_steps(name: str) -> None:
     assert np.abs(rates[13:]).max() > 0.5
 
 
+def test_a_solver_finds_every_output_with_its_value_after_the_states_are_set() -> None:
+    continuous = [i for i, v in enumerate(QuadrotorPlant.variables) if v.variability == "continuous"]
+    seen = [i for i in continuous if QuadrotorPlant.variables[i].causality in ("output", "local")]
+    there, slave = plant(**MOVING, **{"initial.angular_velocity.z": 1.0}), plant()
+    there.do_step(0.0, 0.1)
+    before, expected = np.array(slave.get_real(seen)), np.array(there.get_real(seen))
+    slave.set_real([0, 1, 2, 3], there.get_real([0, 1, 2, 3]))
+    slave._reals[7:20], slave._channels = there._reals[7:20], there._channels
+    slave._derive(0.1, 0.1)
+    found = np.array(slave.get_real(seen))
+    names = np.array([QuadrotorPlant.variables[i].name for i in seen])
+    assert [*names[np.abs(found - expected) > 1e-12]] == []
+    assert [*names[found == before]] == [], "expected a value that moves"
+
+
 def test_the_length_of_the_attitude_returns_to_one_and_moves_no_force() -> None:
     slave = plant(**MOVING)
     before = np.array(slave._derive(0.0, 0.0))
