@@ -66,3 +66,14 @@ def test_parameters_of_a_side_are_changed_by_their_names() -> None:
     assert first.with_changes(plant={"gravity": 9.8}).plant.parameters == {"mass": 1.5, "gravity": 9.8}
     assert first == Scenario().with_changes(parameters={"plant.mass": 1.5, "controller.gain.eta": 4.0})
     assert Scenario().with_changes(reference={"name": "circle", "radius": 2.0}).reference.name == "circle"
+
+
+@pytest.mark.parametrize("what", ["Study", "Comparison", "Tuning"])
+def test_the_path_of_a_file_of_many_runs_is_refused_with_what_reads_it(what: str, tmp_path: Path) -> None:
+    entries: dict[str, Callable[[Any], object]] = {
+        "Study": quadcosim.sweep,
+        "Comparison": quadcosim.compare,
+        "Tuning": lambda tuning: quadcosim.tune(tuning, out=tmp_path),
+    }
+    with pytest.raises(UsageError, match=f"^'many.toml': expected a {what}, which load_{what.lower()} reads from"):
+        entries[what]("many.toml")

@@ -15,7 +15,7 @@ from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.experiments.studies.swept import Swept
 from orchestration.experiments.studies.table import export, frame, units_in
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.extras import explains_missing, needs
 from orchestration.foundation.basics.progress import CountProgress
 from orchestration.foundation.basics.terminal import inform
@@ -102,6 +102,8 @@ def compare(
     `folder`, `workers`, `dask`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises
     what this does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
     """
+    if not isinstance(comparison, Comparison):
+        raise UsageError(f"{shown(repr(comparison))}: expected a Comparison, which load_comparison reads from a file")
     summary = sweep(
         comparison.study, folder=folder, workers=workers, dask=dask, engine=engine, time_limit=time_limit,
         progress=progress, announce=announce,

@@ -20,7 +20,7 @@ from orchestration.experiments.studies.run_key import design_parts, difference, 
 from orchestration.experiments.studies.store_columns import UNITS
 from orchestration.experiments.studies.study import StartValues, Study
 from orchestration.experiments.studies.swept import Swept
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
@@ -83,6 +83,8 @@ def sweep(
     the difference; `QuadcosimError` for failures not caused by a run, without a row, as if `auto` cannot have the
     engine of a store; `KeyboardInterrupt`, stating how far it came, after Ctrl-C.
     """
+    if not isinstance(study, Study):
+        raise UsageError(f"{shown(repr(study))}: expected a Study, which load_study reads from a file")
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
@@ -175,14 +177,13 @@ def expect_current(opened: store.Store, study: Study) -> None:
     about = opened.about()
     if STUDY_PARTS not in about:
         raise UsageError(f"{opened.path}: expected the store of a study that has begun")
-    changes = difference(
-        {**json.loads(about[STUDY_PARTS]), **json.loads(about[DESIGN_PARTS])},
-        {**study_parts(study), **design_parts(study)},
-    )
+    before, now = json.loads(about[STUDY_PARTS]), study_parts(study)
+    changes = difference({**before, **json.loads(about[DESIGN_PARTS])}, {**now, **design_parts(study)})
     if changes:
+        what_runs_it = "with another --out runs it" if difference(before, now) else "runs what is missing"
         raise UsageError(
             f"{opened.path}: the study file has changed since ({changes}); expected the study that was run: "
-            "quadcosim sweep runs what is missing"
+            f"quadcosim sweep {what_runs_it}"
         )
 
 

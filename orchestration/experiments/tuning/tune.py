@@ -15,7 +15,7 @@ from orchestration.experiments.tuning.record import open_record
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import gains_text
 from orchestration.experiments.tuning.tuning_problem import Costs, SearchResult, TuningProblem, best_by_period
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.extras import explains_missing, needs
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
@@ -103,6 +103,8 @@ def tune(
 
     Raises `UsageError` for an invalid tuning, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
     """
+    if not isinstance(tuning, (Tuning, ExactTuning)):
+        raise UsageError(f"{shown(repr(tuning))}: expected a Tuning, which load_tuning reads from a file")
     folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
     done: Sequence[SearchResult]
     if isinstance(tuning, Tuning):

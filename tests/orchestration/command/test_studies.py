@@ -128,13 +128,14 @@ def test_a_changed_study_is_wrong_usage(flown: Path, main: Main) -> None:
 def test_a_changed_study_file_is_refused_and_old_rows_are_not_shown_for_it(
     flown: Path, command: str, main: Main
 ) -> None:
-    for text, said in (
-        (GRID.replace("stop_time = 0.1", "stop_time = 0.2"), "stop_time was 0.1, is 0.2"),
-        (GRID.replace("[0.02, 0.01]", "[0.02, 0.03]"), "axis period was "),
+    for text, said, what_runs_it in (
+        (GRID.replace("stop_time = 0.1", "stop_time = 0.2"), "stop_time was 0.1, is 0.2", "with another --out runs it"),
+        (GRID.replace("[0.02, 0.01]", "[0.02, 0.03]"), "axis period was ", "runs what is missing"),
     ):
         (flown / "study.toml").write_text(text)
         line = error_line(main(command, "study.toml", code=2))
         assert line.startswith(f"{STORE}: the study file has changed since ({said}")
+        assert line.endswith(f"quadcosim sweep {what_runs_it}")
         assert len(line) < 400
 
 
