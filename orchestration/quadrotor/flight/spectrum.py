@@ -95,9 +95,10 @@ def _command(run: DrawnRun) -> tuple[float, Floats] | None:
 
 
 def _mark_rates(panel: Axes, runs: Sequence[DrawnRun], style: Style) -> None:
-    """Mark the sampling rate of the controller and its Nyquist frequency."""
+    """Mark the sampling rate of what sends the command, the controller or a part of it, and its Nyquist frequency."""
     for run in runs:
-        sampling = run.system.components["controller"].sampling
+        senders = [x.sender for x in run.system.connections if COLUMNS[0] in x.end]
+        sampling = run.system.components[senders[0]].sampling if senders else None
         if sampling is None:
             continue
         rate, color = 1.0 / sampling.period, BLACK if len(runs) == 1 else run.color

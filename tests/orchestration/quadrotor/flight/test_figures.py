@@ -318,3 +318,13 @@ def test_the_spectrum_marks_the_rate_at_which_the_controller_samples(slow: Resul
         rates = [line.get_xdata()[0] for line in axes.get_lines() if line.get_label() == "_rate"]  # type: ignore[index]
         assert rates == pytest.approx([1.0 / 0.03, 0.5 / 0.03])
         assert any(text.get_text().startswith("sampled at 33.3") for text in axes.texts)
+
+
+def test_the_spectrum_marks_the_rate_of_what_sends_the_command_by_any_name(slow: Result, tmp_path: Path) -> None:
+    system = replace(slow.request.as_system(), objectives={}, optional=(), criterion=Criterion(), operating_point={})
+    quadcosim.save_run(quadcosim.run(replace(system, stop_time=0.2)), tmp_path)
+    renamed = tmp_path / "renamed.toml"
+    renamed.write_text((tmp_path / "scenario.toml").read_text().replace("controller", "law"))
+    for axes in draw(quadcosim.run(renamed), ["spectrum"])["spectrum"].axes:
+        rates = [line.get_xdata()[0] for line in axes.get_lines() if line.get_label() == "_rate"]  # type: ignore[index]
+        assert rates == pytest.approx([1.0 / 0.03, 0.5 / 0.03])
