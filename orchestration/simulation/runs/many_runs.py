@@ -218,11 +218,11 @@ def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
     """The names of the results of a run; default: all. Raises `UsageError` for an unknown one."""
     if isinstance(names, str):
         raise UsageError(f"outputs = {names!r}: expected a list of names")
-    known = [*system.objectives, *system.optional, *FIXED]
+    known = [*dict.fromkeys((*system.objectives, *system.optional, *FIXED))]
     for name in names or ():
         if name not in known:
             raise UsageError(f"outputs: {name}: {expected_name(name, known)}")
-    return tuple(dict.fromkeys(known if names is None else names))
+    return tuple(known if names is None else dict.fromkeys(names))
 
 
 def _reason_unavailable(system: System, models: Mapping[str, Model], in_process: bool) -> str | None:
