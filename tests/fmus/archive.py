@@ -7,7 +7,7 @@ from pathlib import Path
 from fmu_kit.archive import write_archive
 from fmu_kit.loader import BESIDE
 from orchestration.components.checks.validation.fmu import Fmu, read_fmu
-from orchestration.components.fmi.archive import DESCRIPTION, read_archive, read_root
+from orchestration.components.fmi.archive import DESCRIPTION, read_archive, read_checked_root
 
 
 def files_of(fmu: Path) -> dict[str, bytes]:
@@ -30,4 +30,4 @@ def view_of(text: str) -> Fmu:
         path = Path(folder) / "m.fmu"
         write_archive(path, {DESCRIPTION: text.encode()}, first=DESCRIPTION)
         archive = read_archive(path, 1.0)
-        return read_fmu(archive, read_root(archive))
+        return read_fmu(archive, read_checked_root(archive))

@@ -1,1 +1,1 @@
-"""FMUs as simulators: descriptions and instances of FMI 2.0 and 3.0, in this process or one of their own."""
+"""FMUs as simulators: descriptions and instances of FMI 1.0, 2.0 and 3.0, in this process or one of their own."""

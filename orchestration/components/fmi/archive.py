@@ -19,12 +19,12 @@ class UnreadableFmuError(QuadcosimError):
 
 
 class OtherVersionError(UnreadableFmuError):
-    """It is an FMU of a version of FMI that is not supported."""
+    """It is an FMU of a version of FMI that is not checked."""
 
 
 VERSIONS = {"2.0": 2, "3.0": 3}
-"""Supported versions of FMI, as model descriptions write them"""
-TOKENS = {2: "guid", 3: "instantiationToken"}
+"""Versions of FMI that are checked, as model descriptions write them"""
+TOKENS = {1: "guid", 2: "guid", 3: "instantiationToken"}
 """Attribute by which a library identifies its description, by version of FMI"""
 
 
@@ -103,11 +103,16 @@ def expect_honest_size(path: Path) -> None:
 
 
 def read_root(archive: Archive) -> Element:
-    """The model description; raises `UnreadableFmuError` for no XML, `OtherVersionError` for an unsupported version."""
+    """The model description, of any version of FMI; raises `UnreadableFmuError` for no XML."""
     try:
-        root = ElementTree.fromstring(archive.files[DESCRIPTION])
+        return ElementTree.fromstring(archive.files[DESCRIPTION])
     except ElementTree.ParseError as error:
         raise UnreadableFmuError(f"{DESCRIPTION}: expected well-formed XML: {error}") from error
+
+
+def read_checked_root(archive: Archive) -> Element:
+    """The same of a version of FMI that is checked; raises `OtherVersionError` for another one."""
+    root = read_root(archive)
     version = root.get("fmiVersion")
     if version not in VERSIONS:
         raise OtherVersionError(

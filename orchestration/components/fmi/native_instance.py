@@ -1,4 +1,4 @@
-"""Instances of FMUs in this process, through fmpy: the common part of FMI 2.0 and FMI 3.0.
+"""Instances of FMUs in this process, through fmpy: the common part of all versions of FMI.
 
 The arrays of a step are allocated once, and the arguments of a transfer are converted to C once.
 """
@@ -130,6 +130,9 @@ class NativeInstance(Instance):
         self._enter(begin + start, None if math.isinf(stop) else begin + stop)
         for name, value in self._lost_values():
             self._put(self.variable(name), value)
+        self._warn_of_lost_values()
+
+    def _warn_of_lost_values(self) -> None:
         for name, value in self._lost_values():
             self.warnings.append(f"{self.name}.{name}: was set to {value}, the FMU has {self.get(name)}")
 

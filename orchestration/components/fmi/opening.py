@@ -107,7 +107,7 @@ _opened: set[str] = set()
 
 
 def open_instance(path: Path, instance_name: str, access: Access = USUAL) -> Instance:
-    """An instance of the FMU at `path`, of FMI 2.0 or 3.0, that behaves as the first one of a process.
+    """An instance of the FMU at `path`, of FMI 1.0, 2.0 or 3.0, that behaves as the first one of a process.
 
     A second one has a separate process if the FMU declares that a process can have one only, or if it has not been
     shown to behave as the first.
@@ -139,5 +139,9 @@ def open_here(path: Path, instance_name: str, access: Access = USUAL) -> NativeI
             instance = Fmi3Instance(path, instance_name)
             instance.warnings.append(f"{instance_name}: handles its events itself, as it refuses event mode: {error}")
             return instance
+    if model.version == 1:
+        from orchestration.components.fmi.fmi1 import Fmi1Instance  # not before: few FMUs are of FMI 1.0
+
+        return Fmi1Instance(path, instance_name, access)
     kind = Fmi3Instance if model.version == 3 else Fmi2Instance
     return kind(path, instance_name, access)

@@ -1,4 +1,4 @@
-"""The model of an FMU: its description, in one form for FMI 2.0 and FMI 3.0."""
+"""The model of an FMU: its description, in one form for FMI 1.0, 2.0 and 3.0."""
 
 import functools
 import itertools
@@ -22,7 +22,7 @@ from orchestration.components.fmi import trust
 from orchestration.components.fmi.access import INTERFACES, SCHEDULED, USUAL, Access, Interface
 from orchestration.components.fmi.archive import (
     TOKENS,
-    OtherVersionError,
+    VERSIONS,
     UnreadableFmuError,
     expect_honest_size,
     read_archive,
@@ -161,7 +161,7 @@ class Model:
 
     @property
     def version(self) -> int:
-        """Of FMI: 2 or 3."""
+        """Of FMI: 1, 2 or 3."""
         return int(self.description.fmiMajorVersion)
 
     @property
@@ -319,8 +319,10 @@ def read_description(path: Path) -> ModelDescription:
     except Exception as error:  # fmpy passes on any exception of the readers of zip and XML
         _expect_version(path)
         raise UsageError(f"{path}: expected an FMU with a valid modelDescription.xml: {error}") from error
-    if description.fmiMajorVersion not in (2, 3):
-        raise UsageError(f"{path}: FMI {description.fmiVersion}; expected FMI 2.0 or 3.0")
+    if description.fmiMajorVersion == 1:
+        from orchestration.components.fmi.fmi1_description import completed  # not before: few FMUs are of FMI 1.0
+
+        completed(description, read_root(read_archive(path, math.inf)), path)
     offered = declared_of(description)
     if not offered:
         raise UsageError(f"{path}: offers no interface; expected co-simulation, model exchange or scheduled execution")
@@ -347,17 +349,16 @@ def declared_of(description: ModelDescription) -> dict[Interface, Any]:
 def _expect_version(path: Path) -> None:
     """Raise `UsageError` for an FMU that says to be of a version of FMI that is not supported."""
     with suppress(UnreadableFmuError):
-        try:
-            read_root(read_archive(path, math.inf))
-        except OtherVersionError as error:
-            raise UsageError(f"{path}: {str(error).partition(';')[0]}") from None
+        version = read_root(read_archive(path, math.inf)).get("fmiVersion")
+        if version not in ("1.0", *VERSIONS):
+            raise UsageError(f"{path}: fmiVersion = {version}: expected 1.0, 2.0 or 3.0")
 
 
 def read_model(path: str | Path, access: Access = USUAL) -> Model:
     """Read the model of an FMU that is called in a way.
 
-    It is read once in a process while the file stays the same. Raises `UsageError` for a file that is no FMU of FMI 2.0
-    or 3.0, or does not offer what is asked.
+    It is read once in a process while the file stays the same. Raises `UsageError` for a file that is no FMU of FMI
+    1.0, 2.0 or 3.0, or does not offer what is asked.
     """
     path = Path(path)
     with readable(path, "FMU"):

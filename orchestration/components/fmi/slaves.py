@@ -127,8 +127,9 @@ def collecting_callbacks(messages: list[Message], name: str, folder: Path) -> fm
 
 def status_name(version: int, status: int) -> str:
     """The name of the status of a call in a version of FMI."""
-    names = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")[: 6 if version == 2 else 5]
-    return f"fmi{version}{names[status]}" if 0 <= status < len(names) else f"{status}, which is no status of FMI"
+    names = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")[: 5 if version == 3 else 6]
+    prefix = "fmi" if version == 1 else f"fmi{version}"
+    return f"{prefix}{names[status]}" if 0 <= status < len(names) else f"{status}, which is no status of FMI"
 
 
 def failure_text(messages: Sequence[Message], otherwise: str) -> tuple[str, str]:
@@ -168,6 +169,7 @@ def _forget(environment: int, name: bytes, messages: list[Message]) -> None:
 
 _IS_X86 = fmpy.platform_tuple.startswith("x86")
 FOLDERS: Mapping[int, tuple[str, ...]] = {
+    1: (fmpy.platform,),
     2: (fmpy.platform,) if _IS_X86 else (fmpy.platform_tuple, fmpy.platform),
     3: (fmpy.platform_tuple,),
 }

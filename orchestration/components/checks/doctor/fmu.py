@@ -26,7 +26,7 @@ from orchestration.components.fmi.archive import (
     TOKENS,
     UnreadableFmuError,
     read_archive,
-    read_root,
+    read_checked_root,
     version_of,
 )
 from orchestration.components.fmi.slaves import binary_folders
@@ -118,7 +118,7 @@ class InspectedFmu:
 def inspected(path: Path, size_limit: float = math.inf) -> InspectedFmu:
     """The requirements of a file; raises `UnreadableFmuError` if it is no FMU, or unpacks to over `size_limit` MB."""
     archive = read_archive(path, size_limit)
-    description = read_root(archive)
+    description = read_checked_root(archive)
     version = version_of(description)
     kinds = tuple(kind for kind in KINDS if description.find(kind) is not None)
     chosen = description.find(kinds[0]) if kinds else None

@@ -17,7 +17,7 @@ from orchestration.components.checks.validation.own_description import own_descr
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.progress import Reporter
 from orchestration.components.checks.validation.structure import indices
-from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_root
+from orchestration.components.fmi.archive import DESCRIPTION, UnreadableFmuError, read_archive, read_checked_root
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.components.fmi.slaves import FOLDERS, expect_readable_place
 from orchestration.foundation.basics.errors import UsageError
@@ -55,7 +55,7 @@ def check_description(path: Path, size_limit: float, report: Reporter) -> Fmu | 
     try:
         archive = read_archive(path, size_limit)
         report.try_rules(rules.OF_ARCHIVES, archive)
-        root = read_root(archive)
+        root = read_checked_root(archive)
         if root.find("CoSimulation") is None and root.find("ModelExchange") is None:
             raise UnreadableFmuError(f"{DESCRIPTION}: expected CoSimulation or ModelExchange, nothing else was checked")
         report.try_rules((standard,), archive)
