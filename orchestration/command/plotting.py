@@ -12,7 +12,7 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group, result_of_files
 from orchestration.foundation.basics.errors import UsageError, shown
-from orchestration.foundation.basics.terminal import Share, progress_bar
+from orchestration.foundation.basics.terminal import Share, progress_bar, warn
 from orchestration.quadrotor.flight.names import FIGURES
 
 if TYPE_CHECKING:
@@ -54,6 +54,9 @@ def plot(
         if film is not None:
             return result_of_files([_write_film(results, names, window, film, look.figure_style, progress)])
         figures = draw(results, figure, names=names, window=window, style=look.figure_style)
+        for name in figure or ():
+            if name not in figures:
+                warn(f"--figure {name}: left out, as these runs have none")
         folder = out or (directory[0] if len(directory) == 1 else _beside(directory))
         return result_of_files(save(figures, folder, look.figure_style, progress))
 

@@ -284,6 +284,8 @@ def test_plot_zooms_on_a_window(main: Main, here: Path) -> None:
     done = main("plot", "run", "--figure", "commands", "--from", "0.1", "--to", "0.2", *small)
     assert [Path(line).name for line in done.stdout.splitlines()] == ["commands.png"]
     assert (here / "run" / "commands.png").read_bytes() != before
+    done = main("plot", "run", "--figure", "schedule", *small)
+    assert (done.stdout, done.stderr) == ("", "warning: --figure schedule: left out, as these runs have none\n")
     for start, end in (("0.2", "0.1"), ("50", "60"), ("0.5", "0.6"), ("-1", "0.1"), ("0.1", "inf"), ("nan", "0.1")):
         line = error_line(main("plot", "run", "--from", start, "--to", end, code=2))
         assert line.startswith(
