@@ -74,6 +74,9 @@ class Study:
             raise UsageError(
                 f"design.repeat = {self.repeat}: {expected_name(self.repeat, listed)}, an axis with values or a number"
             )
+        for axis in self.axes if self.repeat is not None else ():
+            if axis.values is not None and len(set(axis.values)) < len(axis.values):  # one run would count as several
+                raise UsageError(f"axis {axis.name}: expected each value once, for shares of the runs of a cell")
         for each in self.together:
             if not set(each.axes) <= set(names):
                 raise UsageError(f"axes = {', '.join(names)}: expected {', '.join(each.axes)} among them")

@@ -165,5 +165,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
 def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:
     with pytest.raises(UsageError, match=r"design.repeat = seeds: .*expected one of timing.period, seed"):
         study(PERIODS, axis("seed", 1, 2), repeat="seeds")
+    with pytest.raises(UsageError, match=r"axis seed: expected each value once"):
+        study(PERIODS, axis("seed", 1, 2, 1), repeat="seed")
     with pytest.raises(UsageError, match="axis controller: expected a base without a vehicle"):
         study(LAWS, base=Scenario(vehicle=load_vehicle("crazyflie", Path())))
