@@ -221,5 +221,5 @@ def _repetitions(cells: "pd.DataFrame", metric: str) -> str:
     if most == 1:
         return ""
     runs = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-    width = 0.5 * (cells["high"] - cells["low"]).max()
-    return f"{runs} runs a cell" + (f"; intervals at 95 % of up to ±{width:.2f}" if metric == GOOD else "")
+    width = (cells["high"] - cells["low"]).max()
+    return f"{runs} runs a cell" + (f"; intervals at 95 % up to {width:.2f} wide" if metric == GOOD else "")

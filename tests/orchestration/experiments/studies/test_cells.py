@@ -97,7 +97,7 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
     assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
     assert figure.get_suptitle() == (
-        "8 runs a cell; intervals at 95 % of up to ±0.28; dots: that of the difference excludes 0"
+        "8 runs a cell; intervals at 95 % up to 0.56 wide; dots: that of the difference excludes 0"
     )
 
 
@@ -117,7 +117,7 @@ def test_one_law_alone_has_one_map_and_no_word_of_a_difference() -> None:
     alone = runs().query("controller == 'CascadedController'")
     law = axis("controller", "CascadedController")
     figure = cell_maps(alone, (PERIODS, LOSSES), law, "good", WORDS, units={})
-    assert figure.get_suptitle() == "8 runs a cell; intervals at 95 % of up to ±0.28"
+    assert figure.get_suptitle() == "8 runs a cell; intervals at 95 % up to 0.56 wide"
 
 
 def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
