@@ -17,8 +17,9 @@ def new(
     author: Annotated[str | None, option("--author", "Author; default: git's user.name.")] = None,
     license: Annotated[str, option("--license", "Licence of the slave.", "TEXT")] = "",
     in_c: Annotated[bool, option("--c", "A controller in C, and the file by which it is wrapped.")] = False,
+    out: Annotated[Path, option("--out", "Folder in which it is written; default: this one.", "DIR")] = Path(),
 ) -> CommandResult:
-    """Write a folder NAME here: a law in a few lines, its test, a system that uses it, a page of commands."""
+    """Write a folder NAME: a law in a few lines, its test, a system that uses it, a page of commands."""
     from orchestration.components.scaffold.folder import Kind, git_author, write
 
     kinds = {each: each for each in get_args(Kind)}
@@ -27,12 +28,12 @@ def new(
     if in_c and kind != "controller":
         raise UsageError(f"new {kind} --c: expected controller")
     author = git_author() if author is None else author
-    written = write(kinds[kind], name, Path(), author=author, license=license, in_c=in_c)
+    written = write(kinds[kind], name, out, author=author, license=license, in_c=in_c)
     if not author:
         inform(
             f"no author is set: set it by --author NAME, or in the line author = of the {'file' if in_c else 'class'}"
         )
-    inform(f"next: quadcosim run {name}/system.toml")
+    inform(f"next: quadcosim run {out / name / 'system.toml'}")
     return result_of_files(written)
 
 

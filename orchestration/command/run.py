@@ -149,4 +149,6 @@ def _metrics(result: "Result") -> CommandResult:
     for name, value in shown.items():
         text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
         lines.append(f"{name:<{width}}  {text}{'' if value is None else after(units.get(name))}")
+    if result.system.computers or result.system.networks:
+        found["missed_deadlines"] = result.missed_deadlines
     return CommandResult(document=found, verdict=result.verdict, lines=lines)

@@ -37,6 +37,7 @@ from orchestration.foundation.basics.records import record
 from orchestration.foundation.processes import subprocesses
 
 WHAT = "file of a controller in C"
+_DEGREES = re.compile("deg|°")
 REFUSED = 2
 """Exit code of the packer for code that cannot be wrapped as it is"""
 
@@ -134,7 +135,9 @@ class WrapFile:
             try:
                 base_unit_exponents(variable.unit)
             except ValueError as error:
-                raise UsageError(f"{kind}.{name}: {error}") from None
+                inside = "after_parameters" if kind == "parameters" else "step"
+                hint = f"; degrees are rad here, and converted in {inside}" if _DEGREES.search(variable.unit) else ""
+                raise UsageError(f"{kind}.{name}: {error}{hint}") from None
             if kind != "parameters" and (variable.min is not None or variable.max is not None):
                 raise UsageError(f"{kind}.{name}: expected min and max of parameters only")
 

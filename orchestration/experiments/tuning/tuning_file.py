@@ -47,7 +47,7 @@ class TuningFile:
     search: SearchTable
     """The effort of the search."""
     parameters: list[AxisTable]
-    """The parameters to tune, each in a range: at least two."""
+    """The parameters to tune, each in a range: at least one."""
     starts: StartsTable | None = None
     """The initial conditions, and how many others the result is judged on."""
     name: str | None = None

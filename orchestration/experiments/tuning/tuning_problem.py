@@ -44,8 +44,8 @@ class TuningProblem:
     """The seeds of the optimiser, each for a separate search; the search with the lowest cost is taken."""
 
     def __post_init__(self) -> None:
-        if len(self.parameters) < 2:
-            raise UsageError("parameters: expected at least two; one is found by a study with an axis")
+        if not self.parameters:
+            raise UsageError("parameters: expected at least one")
         if self.evaluations < 1:
             raise UsageError(f"evaluations = {self.evaluations}: expected at least 1")
         for name in ("periods", "seeds"):
@@ -144,14 +144,16 @@ def minimise(
     """
     import cma  # deferred: it imports matplotlib
 
-    first = np.random.default_rng(seed).uniform(0.25, 0.75, len(tuning.parameters))
+    size = len(tuning.parameters)
+    first = np.random.default_rng(seed).uniform(0.25, 0.75, max(size, 2))  # a second one without effect: cma needs two
     options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
-    best, least, count = first, np.inf, 0
+    best, least, count = first[:size], np.inf, 0
     while count < tuning.budget:  # no other stopping rule: every controller gets the same effort
-        candidates = [np.asarray(candidate) for candidate in strategy.ask()]
+        asked = strategy.ask()
+        candidates = [np.asarray(candidate)[:size] for candidate in asked]
         values = costs(candidates)
-        strategy.tell(candidates, values)
+        strategy.tell(asked, values)
         count += len(candidates)
         place = int(np.argmin(values))
         if values[place] < least:

@@ -273,12 +273,13 @@ def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedS
 
 
 def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str, tuple[float, float]]:
-    """The components whose code believes another sampling period than theirs: theirs, that of their task on a computer
-    too, and what it believes [s].
+    """The components whose code believes another sampling period than theirs: theirs, also their step or that of their
+    task on a computer, and what it believes [s].
     """
     models = _as_asked(system, models)
     samplings = {name: component.sampling for name, component in system.components.items()}
-    periods = {name: sampling.period for name, sampling in samplings.items() if isinstance(sampling, Sampling)}
+    periods = {name: component.step for name, component in system.components.items() if component.step is not None}
+    periods |= {name: sampling.period for name, sampling in samplings.items() if isinstance(sampling, Sampling)}
     periods |= {
         each.task.component: each.task.period
         for each in placed_tasks(system.computers)

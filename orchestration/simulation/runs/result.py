@@ -1,5 +1,6 @@
 """The result of a run."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +12,7 @@ import numpy.typing as npt
 
 from orchestration.foundation.basics.errors import Named
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.recording.recording import About, Event, Recording, events_of, rows_of
@@ -104,7 +105,20 @@ class Result:
         """How a run ended, by the objective that its criterion judges, and its clock."""
         from orchestration.systems.system.description import describe_clock
 
-        return f"{self._ending()}, {describe_clock(self.system)}"
+        missed = [f"{name} {count}" for name, count in self.missed_deadlines.items()]
+        late = f"; deadlines missed: {some(missed)}" if missed else ""
+        return f"{self._ending()}, {describe_clock(self.system)}{late}"
+
+    @cached_property
+    def missed_deadlines(self) -> dict[str, int]:
+        """How many jobs and frames missed their deadlines, by COMPUTER.TASK or NETWORK.MESSAGE that missed any."""
+        if not (self.system.computers or self.system.networks):
+            return {}
+        missed = Counter[str]()
+        for chunk in self.recording.chunks(("time",)):
+            names, of = chunk.events.names, chunk.events.table[chunk.events.are("missed"), 2]
+            missed.update(names[place] for place in of)
+        return dict(missed.most_common())
 
     def _ending(self) -> str:
         metrics, units = self.metrics, self.units

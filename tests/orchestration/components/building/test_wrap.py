@@ -282,6 +282,7 @@ def test_code_that_fails_at_its_start_is_told_by_its_signal(of: Callable[..., Pa
         ("period = 0.05", "period = -1", "period = -1: expected a positive number of seconds"),
         ("period = 0.05", "", "period: expected the sampling period that the code believes"),
         ('unit = "m"', 'unit = "parsec"', "inputs.x: unit parsec: expected powers of"),
+        ('unit = "m"', 'unit = "deg"', "as in N.m, kg.m2 or W/(m2.K); degrees are rad here, and converted in step"),
         ("period = 0.05", "period", "pd.toml: expected TOML"),
         ("sources", "source", "source: no such key; expected one of"),
         ('"pd.c"', '"no.c"', "sources: no.c: no such file in"),

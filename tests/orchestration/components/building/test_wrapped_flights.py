@@ -19,6 +19,7 @@ from orchestration.components.fmi.read_description import read_model
 from orchestration.components.scaffold.folder import write
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.documents import read_toml
+from orchestration.simulation.requests.one_fmu import alone
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.simulation import run
 from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
@@ -68,6 +69,8 @@ def test_a_run_at_another_period_warns_and_at_its_own_does_not(integrator: Path)
         "controller (Pd): is sampled every 0.2 s, but its code believes 0.05 s: what it computes of time is wrong by "
         "that ratio",
     )
+    (told,) = run(alone(integrator.with_name("Pd.fmu"), interval=0.2, stop_time=1.0)).warnings
+    assert told.startswith("Pd (Pd): is sampled every 0.2 s, but its code believes 0.05 s")
 
 
 def test_a_task_of_a_computer_at_another_period_warns(integrator: Path) -> None:
@@ -75,8 +78,12 @@ def test_a_task_of_a_computer_at_another_period_warns(integrator: Path) -> None:
     text = integrator.read_text().replace("sampling = { period = 0.05 }\n", "")
     placed = integrator.with_name("placed.toml")
     placed.write_text(f"{text}\n{task}")
-    (told,) = run(changed(load_system(placed), {"stop_time": 1.0})).warnings
+    system = changed(load_system(placed), {"stop_time": 1.0})
+    (told,) = run(system).warnings
     assert told.startswith("controller (Pd): is sampled every 0.2 s, but its code believes 0.05 s")
+    assert "missed" not in run(system).verdict
+    late = run(changed(system, {"computers.node.tasks.control.execution": 0.3}))
+    assert late.verdict.endswith("; deadlines missed: node.control 5")
 
 
 IN_TWO = """\
@@ -269,6 +276,13 @@ def test_what_new_writes_in_c_passes_its_tests_and_flies_a_vehicle(hover: Path) 
         cwd=hover.parents[1], capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
+    renamed = hover.with_name("test_hover_c.py").read_text().replace('"hover_c_step"', '"hover_c_outer"')
+    hover.with_name("test_renamed.py").write_text(renamed)
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "nose", "hover_c/test_renamed.py"],
+        cwd=hover.parents[1], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert "hover_c.c has no hover_c_outer: in after_step, call what hover_c.toml calls now" in done.stdout
     mine = FmuChoice(fmu=str(hover))
     result = run(Scenario(stop_time=0.3, controller=mine, plant=FmuChoice(fmu="native/QuadrotorPlant")))
     assert not result.metrics["diverged"]

@@ -60,6 +60,12 @@ def test_five_commands_lead_to_the_limit_plot_of_ones_own_controller(here: Path,
     assert drawn.read_bytes().startswith(b"\x89PNG")
 
 
+def test_it_is_written_where_it_is_asked_for(here: Path, main: Main) -> None:
+    made = main("new", "controller", "mine", "--c", "--out", here / "deep" / "er")
+    assert made.stdout.splitlines()[0] == f"{here}/deep/er/mine/mine.c"
+    assert f"next: quadcosim run {here}/deep/er/mine/system.toml" in made.stderr
+
+
 def test_each_passes_its_own_tests_and_a_mistake_is_reported_with_its_line(here: Path, main: Main) -> None:
     for name, kind in KINDS.items():
         write(kind, name, here, author="Ada", license="MIT")

@@ -11,7 +11,7 @@ from orchestration.experiments.tuning import tune as tunes
 from orchestration.experiments.tuning.tune import run_searches, write
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import load_tuning
-from orchestration.experiments.tuning.tuning_problem import best_by_period
+from orchestration.experiments.tuning.tuning_problem import best_by_period, minimise
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.batch import shape
@@ -211,9 +211,12 @@ def test_errors_in_a_file_are_reported(tmp_path, before, after, named):
     assert str(error.value).startswith(f"{path}: {named}")
 
 
-def test_a_single_parameter_is_refused(tuning):
-    with pytest.raises(UsageError, match="expected at least two"):
-        replace(tuning, parameters=tuning.parameters[:1])
+def test_a_single_parameter_is_tuned_and_none_is_refused(tuning):
+    one = replace(tuning, parameters=tuning.parameters[:1], evaluations=60)
+    found = minimise(one, 0, lambda points: [abs(float(point[0]) - 0.3) for point in points], lambda share: None)
+    assert found.shares == pytest.approx([0.3], abs=0.01)
+    with pytest.raises(UsageError, match="expected at least one"):
+        replace(tuning, parameters=())
 
 
 LOW = '"trajectory.start_z" = -10.0'
