@@ -8,7 +8,7 @@ import typer
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
-from orchestration.foundation.basics.terminal import inform, inform_in_passing
+from orchestration.foundation.basics.terminal import in_columns, inform, inform_in_passing
 
 
 @flight_options
@@ -78,4 +78,6 @@ def limit(
         for written in draw_limit(request, found, where):
             inform(str(written))
     lines = [f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
+    if shares := limits.shares_as_text(found):
+        lines += ["", *in_columns(shares)]
     return CommandResult(document=found, verdict=found.verdict, lines=lines)

@@ -83,7 +83,8 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
     agreement = LaneAgreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
-    lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing"]
+    then = f"; quadcosim sweep {study} runs them" if missing else ""
+    lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing{then}"]
     if agreement is not None:
         lines.append(f"engine {about[ENGINE]}: {agreement}")
     if note := note_on_engines(engines):
@@ -115,8 +116,7 @@ def export(
         return result_of_files(exporting.of_run(what, out or what, formats or ()))
     if what.is_dir():
         return result_of_files(exporting.of_study(store_path("", what), formats or ()))
-    store, cells = _current_store(what, out), load_study(what).cell_names
-    return result_of_files(exporting.of_study(store, formats or (), cells=cells))
+    return result_of_files(exporting.of_study(_current_store(what, out), formats or (), load_study(what)))
 
 
 @option_group("look", FigureFlags)
@@ -149,7 +149,7 @@ def draw(
 
 
 def _current_store(study: Path, out: Path | None) -> Path:
-    """The store of a study file that has not changed since its runs."""
+    """The store of a study file that has not changed since its runs; warns if some are missing."""
     from orchestration.experiments.studies.store import open_for_reading, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import expect_current
@@ -158,4 +158,7 @@ def _current_store(study: Path, out: Path | None) -> Path:
     path = store_path(loaded.name, out)
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
+        there, total = sum(opened.counts().values()), len(loaded.points)
+    if there < total:
+        warn(f"{path}: {there} of {total} runs; the others are missing, quadcosim sweep {study} runs them")
     return path

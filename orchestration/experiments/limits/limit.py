@@ -155,7 +155,7 @@ DIGITS = 6
 
 
 def as_text(limit: Limit) -> dict[str, str]:
-    """The applicable fields of a limit as text; of the evaluated values, those whose share of seeds is known."""
+    """The applicable fields of a limit as text; of the evaluated values their number."""
     units = {**dict.fromkeys(_IN_ITS_UNIT, limit.unit), "judged_bound": limit.judged_unit, "horizon": "s"}
     known = {name: value for name, value in vars(limit).items() if value not in (None, "", ())}
     texts = dict.fromkeys((name for name in vars(limit) if name in (*known, *_ALWAYS) and name not in _OF_UNITS), "-")
@@ -167,9 +167,21 @@ def as_text(limit: Limit) -> dict[str, str]:
     if (ideal := limit.continuous) is not None:
         settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
         texts["continuous"] = f"{ideal.outcome} at a period of {ideal.period:g} s{settles}"
-    shares = [f"{one.value:.6g}: {describe(one)}" for one in limit.tried if one.share is not None]
-    texts["tried"] = "; ".join(shares) or f"{len(limit.tried)} values"
+    texts["tried"] = f"{len(limit.tried)} values"
     return texts
+
+
+def shares_as_text(limit: Limit) -> list[list[str]]:
+    """A table of the evaluated values whose share of good seeds is known, with its interval; empty without any."""
+    rows = [
+        [quantity(one.value, limit.unit, DIGITS), str(one.flew), f"{one.flew / one.runs:.2f} [{low:.2f}, {high:.2f}]"]
+        for one in limit.tried
+        if one.share is not None
+        for low, high in [one.share]
+    ]
+    if not rows or limit.confidence is None:
+        return []
+    return [[limit.of, f"good of {limit.seeds}", f"share [{100.0 * limit.confidence:g} % Wilson interval]"], *rows]
 
 
 def _mean_square_note(found: LinearLimit, span: Range) -> list[str]:

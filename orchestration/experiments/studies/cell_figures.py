@@ -114,7 +114,7 @@ def cell_maps(
         mesh.name_cells(panel, *(q.of(sorted(axis.values or ())) for q, axis in zip((x, y), axes)))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
-    dots = "; dots: that of the difference excludes 0" if metric == GOOD and len(groups) == 2 else ""
+    dots = "; dots: Newcombe's of the difference excludes 0" if metric == GOOD and len(groups) == 2 else ""
     repetitions = _repetitions(found, metric)
     figure.suptitle(style.lines_of(repetitions and repetitions + dots))
     handles: list[Patch | Line2D] = []
@@ -172,9 +172,10 @@ def _write_counts(
     panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], group: "pd.DataFrame"
 ) -> None:
     x, y = (quantity.of(group[axis.name]) for quantity, axis in zip(quantities, axes))
-    for across, up, good, count, share in zip(x, y, group["good"], group["count"], group["share"]):
+    for across, up, good, count, share, low in zip(x, y, *(group[name] for name in ("good", "count", "share", "low"))):
         color = "white" if share < HALF else BLACK
-        panel.text(across, up, f"{good}/{count}", color=color, ha="center", va="center", fontsize="x-small")
+        text = f"{good}/{count}" if np.isfinite(low) else f"{share:g}/1"
+        panel.text(across, up, text, color=color, ha="center", va="center", fontsize="x-small")
 
 
 def _difference(
@@ -222,4 +223,6 @@ def _repetitions(cells: "pd.DataFrame", metric: str) -> str:
         return ""
     runs = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     width = (cells["high"] - cells["low"]).max()
-    return f"{runs} runs a cell" + (f"; intervals at 95 % up to {width:.2f} wide" if metric == GOOD else "")
+    alike = "; one where nothing is random" if cells["low"].isna().any() else ""
+    known = metric == GOOD and np.isfinite(width)
+    return f"{runs} runs a cell{alike}" + (f"; Wilson intervals at 95 % up to {width:.2f} wide" if known else "")

@@ -13,7 +13,7 @@ from orchestration.experiments.studies.axes import Axis, unit_points
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.maps import heat_map
-from orchestration.experiments.studies.shares import GOOD
+from orchestration.experiments.studies.shares import GOOD, with_chance
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -102,7 +102,7 @@ def _over_axes(
                 f"{study.name}: expected one or two axes of numbers with values, at most one of names, "
                 "and design.repeat for the axis of repetitions, to draw"
             )
-        laws = named[0] if named else None
+        laws, table = named[0] if named else None, with_chance(table, study)
         if len(axes) == 1:
             return {metric: cell_lines(table, axes[0], laws, metric, words, units=units, style=style)}
         both = (axes[0], axes[1])

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.table import FORMATS, export
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.runs.run_directory import MAT, load_run
@@ -23,14 +24,14 @@ def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
     return [*written, *([result.to_mat(out / MAT)] if "mat" in formats else [])]
 
 
-def of_study(store: Path, formats: Sequence[str], *, cells: Sequence[str] | None = None) -> list[Path]:
+def of_study(store: Path, formats: Sequence[str], study: Study | None = None) -> list[Path]:
     """Write the rows of a store beside it, default: as Parquet and CSV; the paths.
 
-    With axes of `cells` also the share of good runs by their values, with its interval.
+    Of a `study` with cells also the share of good runs of each, with its interval.
     """
     for kind in formats:
         _expect(kind, FORMATS)
-    return export(store, store.parent, formats or FORMATS[:2], cells=cells)
+    return export(store, store.parent, formats or FORMATS[:2], study)
 
 
 def _expect(kind: str, known: Sequence[str], hint: str = "") -> None:

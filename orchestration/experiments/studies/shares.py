@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.statistics import wilson
 
@@ -16,12 +17,31 @@ GOOD = "good"
 """Metric that is drawn as a share"""
 
 
+RANDOM = "random"
+"""Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
+
+
+def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
+    """The table of the runs of `study` with the column `RANDOM`.
+
+    It is false in a cell whose system does not depend on the seed, if only the seed is repeated.
+    """
+    starts = study.files().start_values if study.needs_start_values else {}
+    seeds_alone = all(axis.targets == ("seed",) for axis in study.axes if axis.name == study.repeat)
+
+    def is_random(cell: "pd.Series[Any]") -> bool:
+        return not seeds_alone or study.system(int(cell.iloc[0]), starts).depends_on_seed
+
+    cells = table.groupby([axis.name for axis in study.cell_axes], dropna=False)["design_index"]
+    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool)})
+
+
 def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "pd.DataFrame":
     """A row for each combination of the values of the axes `by` that has finished runs.
 
-    Columns: those axes, `count` of runs, `good` of them, `share`, its Wilson interval at 95 % `low` and `high`, and
-    `value`: the share, or the median of another `metric` over the good runs, nan if there are none. Raises `UsageError`
-    if no criterion says what is good.
+    The table is one `with_chance`. Columns: those axes, `count` of runs, `good` of them, `share`, its Wilson interval
+    at 95 % `low` and `high`, nan where nothing is random, and `value`: the share, or the median of another `metric`
+    over the good runs, nan if there are none. Raises `UsageError` if no criterion says what is good.
     """
     import pandas as pd
 
@@ -31,13 +51,16 @@ def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "p
     good = done["good"].astype(bool)
     counted = done.assign(count=1, good=good.astype(int), value=np.nan if metric == GOOD else done[metric].where(good))
     cells = counted.groupby([*by], sort=True).agg(
-        count=("count", "sum"), good=("good", "sum"), value=("value", "median")
+        count=("count", "sum"), good=("good", "sum"), value=("value", "median"), random=(RANDOM, "any")
     )
     cells = cells.reset_index()
     cells["share"] = cells["good"] / cells["count"]
     if metric == GOOD:
         cells["value"] = cells["share"]
-    intervals = [wilson(int(good), int(count)) for good, count in zip(cells["good"], cells["count"])]
+    intervals = [
+        wilson(int(good), int(count)) if random else (np.nan, np.nan)
+        for good, count, random in zip(cells["good"], cells["count"], cells["random"])
+    ]
     cells[["low", "high"]] = pd.DataFrame(intervals, index=cells.index, columns=["low", "high"], dtype=float)
     return cells[[*by, "count", "good", "share", "low", "high", "value"]]
 
@@ -50,9 +73,16 @@ def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
 def interval_of_difference(one: Mapping[str, float], other: Mapping[str, float]) -> tuple[float, float]:
     """The 95 % interval of the share of one cell minus that of another, by Newcombe's method 10.
 
-    Runs with the same seed are taken as independent, which makes it wider than a paired one where they are alike.
+    Runs with the same seed are taken as independent, which makes it wider than a paired one where they are alike. A
+    share without an interval is known exactly; of two such ones the difference has none either, but nan.
     """
     difference = one["share"] - other["share"]
+    if math.isnan(one["low"]) and math.isnan(other["low"]):
+        return math.nan, math.nan
+    one, other = (
+        {**each, "low": each["share"], "high": each["share"]} if math.isnan(each["low"]) else each
+        for each in (one, other)
+    )
     below = math.hypot(one["share"] - one["low"], other["high"] - other["share"])
     above = math.hypot(one["high"] - one["share"], other["share"] - other["low"])
     return difference - below, difference + above

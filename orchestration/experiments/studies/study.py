@@ -162,6 +162,11 @@ class Study:
             raise UsageError(f"{path}: expected a number of the base or of an FMU to multiply")
         return float(value) * float(base)
 
+    @property
+    def needs_start_values(self) -> bool:
+        """Whether its runs have products, which may be with start values of FMUs."""
+        return any(axis.multiplies for axis in self.axes) or any(each.multiplies for each in self.together)
+
     @cached_property
     def _varies_fmu(self) -> bool:
         """Whether it is native, and an axis sets FMUs, which may not be."""

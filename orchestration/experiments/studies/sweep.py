@@ -94,10 +94,11 @@ def sweep(
     study, files = columns.study, columns.files
     path = store.store_path(study.name, folder)
     with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
-        _describe(opened, columns)
+        _expect_same_study(opened, columns)
         if engine == "auto":
             before = opened.about().get(ENGINE, execution.name)
             execution = execution.as_before(before, str(path), "another one needs another --out")
+        _describe(opened, columns)  # last, so that what is refused changes nothing
         missing = _missing(opened, study, retry_failed)
         sweep_progress = _Progress(study, missing, report, announce)
         agreement = None
@@ -276,27 +277,30 @@ def _keep(rows: Rows, opened: store.Store) -> None:
     opened.add(rows)
 
 
+def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
+    """Raise `UsageError` if the store holds another study; its design may differ."""
+    about, study = opened.about(), columns.study
+    if STUDY_PARTS not in about:
+        return
+    before = {**json.loads(about[STUDY_PARTS]), **json.loads(about[PLACE_PARTS])}
+    if changes := difference(before, {**study_parts(study), **place_parts(study, columns.files)}):
+        raise UsageError(
+            f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
+            "or remove the store"
+        )
+
+
 def _describe(opened: store.Store, columns: RunColumns) -> None:
-    """Describe the study in its store, which may hold no other; the design may grow."""
-    about, study, files = opened.about(), columns.study, columns.files
-    parts, place = study_parts(study), place_parts(study, files)
-    if STUDY_PARTS in about:
-        changes = difference(
-            {**json.loads(about[STUDY_PARTS]), **json.loads(about[PLACE_PARTS])}, {**parts, **place}
-        )  # fmt: skip
-        if changes:
-            raise UsageError(
-                f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
-                "or remove the store"
-            )
+    """Describe the study and its design in its store."""
+    study, files = columns.study, columns.files
     design = json.dumps(design_parts(study))
-    if about.get(DESIGN_PARTS) == design:
+    if opened.about().get(DESIGN_PARTS) == design:
         return
     grid: dict[str, Any] | None = {axis.name: axis.values for axis in study.axes}
     opened.describe(
         {
-            STUDY_PARTS: json.dumps(parts),
-            PLACE_PARTS: json.dumps(place),
+            STUDY_PARTS: json.dumps(study_parts(study)),
+            PLACE_PARTS: json.dumps(place_parts(study, files)),
             DESIGN_PARTS: design,
             TOTAL: str(len(study.points)),
             AXES: json.dumps([axis.name for axis in study.axes]),

@@ -87,14 +87,15 @@ class Swept:
     def shares(self) -> "pd.DataFrame":
         """A row for each combination of the axes but `repeat`: `count` of runs, `good`, their `share`, `low`, `high`.
 
-        The interval is Wilson's at 95 %. Raises `UsageError` if the study has no axis that repeats, or no criterion.
+        The interval is Wilson's at 95 %, nan where nothing is random. Raises `UsageError` if the study has no axis that
+        repeats, or no criterion.
         """
-        from orchestration.experiments.studies.shares import shares_of
+        from orchestration.experiments.studies.shares import shares_of, with_chance
         from orchestration.experiments.studies.table import frame
 
         if self.study.cell_names is None:
             raise UsageError("design.repeat: expected the name of the axis that repeats each cell, as seed")
-        return shares_of(frame(self.path), self.study.cell_names)
+        return shares_of(with_chance(frame(self.path), self.study), self.study.cell_names)
 
     @explains_missing
     def to_xarray(self) -> "xr.Dataset":

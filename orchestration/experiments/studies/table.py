@@ -11,9 +11,10 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from fmu_kit.new_files import new_files
-from orchestration.experiments.studies.shares import differences_of, shares_of
+from orchestration.experiments.studies.shares import differences_of, shares_of, with_chance
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
+from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.recording import mat_file
@@ -107,23 +108,24 @@ def _with_units(table: Any, units: Mapping[str, str]) -> Any:
 
 
 def export(
-    path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv"), *, cells: Sequence[str] | None = None
+    path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv"), study: Study | None = None
 ) -> list[Path]:
     """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
 
-    With axes of `cells` also the share of good runs by their values as `shares`, likewise, and of two laws those of the
-    second minus those of the first, as `differences`. Parquet has units in the
-    metadata of its fields, as `unit`; MAT has a structure `runs` with a field for each column, and `units` with the
-    same fields. Warns of runs by several engines.
+    Of a `study` with cells also the share of good runs of each as `shares`, likewise, and of two laws those of the
+    second minus those of the first, as `differences`. Parquet has units in the metadata of its fields, as `unit`; MAT
+    has a structure `runs` with a field for each column, and `units` with the same fields. Warns of runs by several
+    engines.
     """
     rows = frame(path)
     if note := note_in(rows):
         warn(note)
     tables = {"runs": rows}
-    if cells is not None:
-        tables["shares"] = shares_of(rows, cells)
+    if study is not None and study.cell_names is not None:
+        cells, repeated = study.cell_names, with_chance(rows, study)
+        tables["shares"] = shares_of(repeated, cells)
         laws = [name for name in cells if rows[name].map(type).eq(str).all() and rows[name].nunique() == 2]
-        tables |= {"differences": differences_of(rows, cells, laws[0])} if len(laws) == 1 else {}
+        tables |= {"differences": differences_of(repeated, cells, laws[0])} if len(laws) == 1 else {}
     written = []
     with new_files(folder) as new:
         for name, content in tables.items():

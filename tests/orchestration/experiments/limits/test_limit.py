@@ -18,7 +18,7 @@ import quadcosim
 from orchestration.components.fmi.reuse import Instances
 from orchestration.experiments.limits import limit as limits
 from orchestration.experiments.limits.evaluation import is_good
-from orchestration.experiments.limits.limit import find
+from orchestration.experiments.limits.limit import as_text, find, shares_as_text
 from orchestration.experiments.limits.limit_result import ContinuousRun
 from orchestration.foundation.basics.bisection import Range, first_failure
 from orchestration.foundation.basics.simulator import Floats
@@ -563,6 +563,10 @@ def test_the_value_at_which_nine_in_ten_is_refuted_is_noted_with_its_interval(
     assert (by_value.flew, by_value.runs) == (22, 29)
     assert by_value.share == wilson(22, 29)
     assert "22 of 29 seeds are good, a share of 0.58 to 0.88" in found.note
+    heads, *rows = shares_as_text(found)
+    assert heads == ["loss", "good of 29", "share [95 % Wilson interval]"]
+    assert ["0.25", "29", "1.00 [0.88, 1.00]"] in rows
+    assert as_text(found)["tried"] == f"{len(found.tried)} values"
     passed = {one.value: one for one in found.tried}[0.25]
     assert (passed.flew, passed.share) == (29, wilson(29, 29))
 

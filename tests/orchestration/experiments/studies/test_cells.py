@@ -1,5 +1,7 @@
 """Cells of a study: shares of good runs with their intervals, laws side by side, their difference."""
 
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +12,14 @@ from matplotlib.text import Text
 
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
-from orchestration.experiments.studies.shares import cells_of, differ, differences_of, interval_of_difference
+from orchestration.experiments.studies.shares import (
+    cells_of,
+    differ,
+    differences_of,
+    interval_of_difference,
+    with_chance,
+)
+from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.table import frame
 from orchestration.foundation.basics.statistics import wilson
@@ -19,7 +28,7 @@ from orchestration.simulation.figures.names import COLUMNS
 from orchestration.simulation.figures.style import INCH, PAGE, STYLES
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
-from tests.orchestration.experiments.studies.common import axis, study
+from tests.orchestration.experiments.studies.common import STORE, axis, study
 
 LAWS = axis("controller", "UnifiedController", "CascadedController")
 PERIODS, LOSSES = axis("timing.period", 0.01, 0.02), axis("timing.loss", 0.0, 0.1, 0.2)
@@ -32,7 +41,7 @@ def runs() -> pd.DataFrame:
     rows = [
         {
             "controller": law, "timing.period": period, "timing.loss": loss, "seed": seed, "status": "done",
-            "good": first or (period < 0.02 and seed < 3 * k), "position_rmse": 1.0 + seed,
+            "random": True, "good": first or (period < 0.02 and seed < 3 * k), "position_rmse": 1.0 + seed,
         }
         for law, first in zip(LAWS.values or (), (True, False))
         for period in (0.01, 0.02)
@@ -88,6 +97,33 @@ def test_two_shares_differ_where_newcombes_interval_excludes_0() -> None:
     assert tuple(found.loc[(0.01, 0.1), ["low", "high"]]) == expected
 
 
+def test_a_cell_in_which_nothing_is_random_has_no_interval_and_no_dot() -> None:
+    table = runs().query("seed < 1 or `timing.loss` > 0.0")
+    table = table.assign(random=table["timing.loss"] > 0.0)
+    cells = cells_of(table, ["controller", "timing.period", "timing.loss"])
+    assert cells["low"].isna().tolist() == cells["timing.loss"].eq(0.0).tolist()
+    figure = cell_maps(table, (PERIODS, LOSSES), LAWS, "good", WORDS, units={})
+    (marks,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
+    assert 0.0 not in marks.get_ydata()
+    assert [text.get_text() for text in figure.axes[0].texts] == ["1/1", "8/8", "8/8"] * 2
+    assert "; one where nothing is random; " in figure.get_suptitle()
+    exact, good = ({"share": 1.0, "low": low, "high": 1.0} for low in (np.nan, 0.7))
+    assert interval_of_difference(good, exact) == pytest.approx((-0.3, 0.0))
+    assert not differ(exact, {**exact, "share": 0.0})
+
+
+def test_only_cells_whose_system_depends_on_the_seed_are_random() -> None:
+    def random(chosen: Study) -> list[bool]:
+        indices = pd.DataFrame({"design_index": range(len(chosen.points))})
+        table = indices.join(pd.DataFrame([chosen.points[i] for i in range(len(indices))]))
+        return list(with_chance(table, chosen)["random"])
+
+    seeds = axis("seed", 1, 2)
+    assert random(study(axis("timing.loss", 0.0, 0.1), seeds, repeat="seed")) == [False, False, True, True]
+    starts = axis("plant.initial.position.x", 1.0, 2.0)  # what is repeated may be taken as drawn
+    assert random(study(axis("timing.loss", 0.0), starts, repeat=starts.name)) == [True, True]
+
+
 def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={})
     titles = [panel.get_title() for panel in figure.axes[:3]]
@@ -97,7 +133,7 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
     assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
     assert figure.get_suptitle() == (
-        "8 runs a cell; intervals at 95 % up to 0.56 wide; dots: that of the difference excludes 0"
+        "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; dots: Newcombe's of the difference excludes 0"
     )
 
 
@@ -117,7 +153,7 @@ def test_one_law_alone_has_one_map_and_no_word_of_a_difference() -> None:
     alone = runs().query("controller == 'CascadedController'")
     law = axis("controller", "CascadedController")
     figure = cell_maps(alone, (PERIODS, LOSSES), law, "good", WORDS, units={})
-    assert figure.get_suptitle() == "8 runs a cell; intervals at 95 % up to 0.56 wide"
+    assert figure.get_suptitle() == "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide"
 
 
 def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
@@ -155,9 +191,19 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     shares = pd.read_csv(tmp_path / "results/study/shares.csv")
     assert list(shares) == ["controller", "timing.period", "count", "good", "share", "low", "high"]
     assert shares["count"].tolist() == [2, 2, 2, 2]
+    assert shares[["low", "high"]].isna().all(axis=None), "nothing of it is random"
     differences = pd.read_csv(tmp_path / "results/study/differences.csv")
     assert list(differences) == ["law", "minus", "timing.period", "difference", "low", "high"]
     assert differences["minus"].tolist() == ["UnifiedController"] * 2
+    assert differences[["low", "high"]].isna().all(axis=None)
+    with closing(sqlite3.connect(tmp_path / STORE)) as store, store:
+        store.execute("DELETE FROM runs WHERE key = (SELECT key FROM design WHERE design_index = 7)")
+    for command in ("draw", "export"):
+        warned = main(command, "study.toml").stderr
+        assert f"{STORE}: 7 of 8 runs; the others are missing, quadcosim sweep study.toml runs them" in warned
+    assert (
+        "7 of 8 runs, 0 failed, 1 missing; quadcosim sweep study.toml runs them" in main("status", "study.toml").stdout
+    )
     monkeypatch.setattr(drawing, "frame", lambda store: frame(store).assign(status=None))
     assert "expected at least one finished run" in main("draw", "study.toml", code=2).stderr
 

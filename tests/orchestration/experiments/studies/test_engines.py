@@ -88,6 +88,9 @@ def test_a_failed_compile_does_not_continue_runs_in_lanes_by_another_engine(
         "--out"
     )
     assert bits(STORE) == before
+    path.write_text(BEGUN)
+    assert "2 of 2 runs" in main("status", path).stdout, "its design is as before, too"
+    path.write_text(CONTINUED)
     main("sweep", path)
     after = bits(STORE)
     shutil.rmtree("results")
