@@ -27,9 +27,8 @@ from orchestration.foundation.recording.recording import Recorder
 from orchestration.simulation.engines import condition
 from orchestration.simulation.engines.backlog import Backlog
 from orchestration.simulation.engines.memory import Allocator, SharedTables, allocated_loop
-from orchestration.simulation.engines.run_structures import RunStructures
 from orchestration.simulation.engines.running_system import RunningSystem, Terminated
-from orchestration.simulation.engines.structures import HEADER, ONE_LANE, shared
+from orchestration.simulation.engines.structures import HEADER, ONE_LANE, RunStructures, shared
 from orchestration.systems.schedule.instant_arrays import Schedule
 
 INSTANTS = Path(__file__).with_name("instants.h")
