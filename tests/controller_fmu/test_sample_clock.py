@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller_fmu.sample_clock import SampleClock
+from controller_fmu.sampled import SampleClock
 
 
 def samples(clock: SampleClock, points: Iterable[float]) -> list[int]:

@@ -4,14 +4,60 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import replace
+from enum import IntEnum
 from typing import ClassVar
 
+from fmu_kit.compiler.emit.c_names import c_name, place_names
 from fmu_kit.compiler.emit.lane_writer import LaneWriter
-from fmu_kit.compiler.emit.rates import Rate, is_costly, of_numbers, rates
 from fmu_kit.compiler.trace.statements import Block, Function, Statement
-from fmu_kit.compiler.trace.symbols import Symbol, closure
+from fmu_kit.compiler.trace.symbols import CHEAP, Symbol, closure
 from fmu_kit.compiler.trace.tracing import Program
+
+
+class Rate(IntEnum):
+    """How often a value changes while steps of one length follow one another: its operands, with those before them."""
+
+    NONE = 0
+    """parameters, inputs and the length of the step: it is the same in all steps"""
+    TIME = 1
+    """time at which the step begins"""
+    STATE = 2
+    """places that steps store"""
+
+
+def rates(used: Mapping[int, Symbol], time: Symbol, stores: Set[str]) -> dict[int, Rate]:
+    """The rate of each of the `used` symbols of a function, which come after their operands, by identity.
+
+    The parameter `time` is where a step begins; `stores` are the places that a step stores.
+    """
+    found: dict[int, Rate] = {}
+    for key, symbol in used.items():
+        if symbol is time:
+            found[key] = Rate.TIME
+        elif symbol.op == "load":
+            found[key] = Rate.STATE if symbol.data[0] in stores else Rate.NONE
+        else:
+            found[key] = max((found[id(arg)] for arg in symbol.args), default=Rate.NONE)
+    return found
+
+
+def of_numbers(symbols: Mapping[int, Symbol], rate: Mapping[int, Rate]) -> frozenset[int]:
+    """Those that follow from time alone without conditions that are the same in all steps, by identity."""
+    numeric: set[int] = set()
+    for key, symbol in symbols.items():
+        if rate[key] == Rate.TIME:
+            fixed = [arg for arg in symbol.args if not rate[id(arg)] and arg.op != "constant"]
+            timed = [arg for arg in symbol.args if rate[id(arg)]]
+            if all(arg.kind in ("real", "int") for arg in fixed) and all(id(arg) in numeric for arg in timed):
+                numeric.add(key)
+    return frozenset(numeric)
+
+
+def is_costly(symbol: Symbol) -> bool:
+    """Whether a number takes more than a few sums and products to compute."""
+    return symbol.kind == "real" and bool(symbol.args) and symbol.op not in CHEAP
 
 
 class LineWriter(LaneWriter):
@@ -176,3 +222,20 @@ class StepsWriter(LineWriter):
 def _vector(store: Statement) -> str:
     name: str = store.data
     return name.rpartition(".")[0] or name
+
+
+def lane_code(program: Program, line: Function | None = None) -> str:
+    """The C of the functions of a program in lanes, each after those that it calls, and of its straight line."""
+    names = place_names(program.places)
+    writers: list[LaneWriter] = [LaneWriter(function, program, names) for function in program.functions]
+    if line is None:
+        return "\n\n".join(writer.text() for writer in writers) + "\n"
+    read = {symbol.data[0] for writer in writers for symbol in writer.used.values() if symbol.op == "load"}
+    unread = {variable.name for variable in program.slave.variables} - read
+    several = replace(line, name=f"{line.name} several times", doc="Several of such steps.")
+    return "\n\n".join([
+        *(writer.text() for writer in (*writers, LineWriter(line, program, names, unread))),
+        f"#define STRAIGHT_STEP {c_name(line.name)}", "#ifdef QUADCOSIM_SEVERAL",
+        StepsWriter(several, program, names, unread).text(),
+        f"#define STRAIGHT_STEPS {c_name(several.name)}", "#endif\n",
+    ])  # fmt: skip

@@ -20,7 +20,7 @@ from fmu_kit.archive import NATIVE_TABLES
 from fmu_kit.bundle import PackagingError, Target, bundled_sources, path_in_bundle
 from fmu_kit.compiler.emit.c_code import c_code
 from fmu_kit.compiler.emit.exchange import described
-from fmu_kit.compiler.emit.lane_code import lane_code
+from fmu_kit.compiler.emit.line_writers import lane_code
 from fmu_kit.compiler.emit.standards import CLOCKED, STANDARDS, Standard
 from fmu_kit.compiler.emit.tables import places, tables
 from fmu_kit.compiler.pack import c_compiler

@@ -111,6 +111,13 @@ class Grid:
         return np.asarray(quotients + up)
 
 
+@functools.lru_cache(64)  # most are common to the runs of a study
+def clock_grid(offset: float, period: float, ratio: float) -> Grid:
+    """The instants of a clock that counts `ratio` seconds per true second."""
+    exact = Fraction(repr(float(ratio)))
+    return Grid(exact_nanoseconds(offset) / exact, exact_nanoseconds(period) / exact)
+
+
 def _round_ratio(numerator: int, denominator: int) -> int:
     """round(numerator / denominator), half to even, in integers."""
     quotient, rest = divmod(numerator, denominator)

@@ -17,12 +17,11 @@ from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.libraries import cached_library
 from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.foundation.basics.times import Grid, nanoseconds
+from orchestration.foundation.basics.times import Grid, clock_grid, nanoseconds
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Instants, Span
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.instant_arrays import Schedule
 from orchestration.systems.schedule.lateness_and_loss import whole
-from orchestration.systems.schedule.random_timing import clock_grid
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, HIGHEST, JITTER, LOSS, LOWEST, NORMAL, Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.choices import Spread

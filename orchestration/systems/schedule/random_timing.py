@@ -1,14 +1,13 @@
 """Random times of the samples of one component and of the messages of one connection, in order."""
 
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.times import Constant, Grid, exact_nanoseconds, nanoseconds
+from orchestration.foundation.basics.times import Constant, clock_grid, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, in_seconds
 from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
 from orchestration.systems.schedule.plan import Plan
@@ -207,13 +206,6 @@ class ClockedComponent(TimedComponent):
                 columns += [sent, link.messages(sent)]
             self._append(k, now, then, columns)
             self._k, self._next = last, times[-1:]
-
-
-@lru_cache(64)  # most are common to the runs of a study
-def clock_grid(offset: float, period: float, ratio: float) -> Grid:
-    """The instants of a clock that counts `ratio` seconds per true second."""
-    exact = Fraction(repr(float(ratio)))
-    return Grid(exact_nanoseconds(offset) / exact, exact_nanoseconds(period) / exact)
 
 
 class ScheduledComponent(TimedComponent):

@@ -7,13 +7,14 @@ So every value is written twice, in a set of each component and in one of the sy
 `docs/guides/ssp.md` has the call for each tool.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fmu_kit.archive import write_archive
 from fmu_kit.new_files import new_files
 from fmu_kit.units import BASE
+from fmu_kit.variables import INDEX
 from fmu_kit.versions import generation_tool
 from fmu_kit.write_description import generation_date
 from orchestration.components.fmi.read_description import Kind, Variable
@@ -22,7 +23,7 @@ from orchestration.simulation.requests.ssp import timing
 from orchestration.simulation.requests.ssp.document import add, document, element
 from orchestration.simulation.requests.ssp.export import Export, Part, export_of
 from orchestration.simulation.requests.ssp.names import PARAMETER_SET, SYSTEM_PARAMETERS
-from orchestration.simulation.requests.ssp.rejections import rejections
+from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request
@@ -217,3 +218,39 @@ def _add_units(root: Element, tag: str, parts: Iterable[Part]) -> None:
 
 _BASE = {**dict.fromkeys(BASE, 0), "factor": 1.0, "offset": 0.0}
 """The defaults of a base unit in the standard."""
+
+
+def rejections(export: Export) -> Iterator[str]:
+    """A line for each rejected value and connection, with its place in the system and the masters."""
+    parts = {part.name: part for part in export.parts}
+    for part in export.parts:
+        for name, value in part.parameters.items():
+            masters = _masters_without(part, name, value)
+            if masters is not None:
+                kind, instead = part.variable(name).kind, _integer_instead(part, name, value)
+                yield f"components.{part.name}.parameters.{name} = {value}: of type {kind}; {masters}{instead}"
+    for x in export.system.connections:
+        for start, end in zip(x.start, x.end, strict=True):
+            kinds = [
+                parts[name].variable(variable_of(port)).kind for name, port in ((x.sender, start), (x.receiver, end))
+            ]
+            if kinds[0] != kinds[1] or "Enumeration" in kinds:
+                yield f"{start} to {end}: from {kinds[0]} to {kinds[1]}; libcosim and ecos refuse the SSP"
+
+
+def _integer_instead(part: Part, name: str, value: Parameter) -> str:
+    """The alternative that all masters accept: the Integer that this project's FMUs have beside an Enumeration."""
+    index, choices = f"{name}{INDEX}", part.variable(name).choices
+    if index not in part.model.variables or not choices:
+        return ""
+    return f"; all take {index} = {choices.get(str(value), value)}"
+
+
+def _masters_without(part: Part, name: str, value: Parameter) -> str | None:
+    """The behaviour of masters that reject a value; None if all accept it."""
+    kind = part.variable(name).kind
+    if kind == "Enumeration" and isinstance(value, str):
+        return "libcosim crashes, ecos and fmpy refuse the SSP"
+    if kind == "Enumeration":
+        return "libcosim and ecos leave it as it starts"
+    return "fmpy refuses the SSP" if kind == "String" else None

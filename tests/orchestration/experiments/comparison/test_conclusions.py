@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestration.experiments.comparison import equal_terms, fronts
+from orchestration.experiments.comparison import fronts, outcome
 from orchestration.experiments.comparison.bandwidth import Bandwidths
 from orchestration.experiments.comparison.cells import cell_summaries, table_of_runs
 from orchestration.experiments.comparison.design import Comparison, Condition, Controller, VehicleEntry
@@ -131,7 +131,7 @@ def test_controllers_with_missing_runs_have_no_limit_yet(comparison: Comparison,
 def test_at_equal_bandwidth_what_depends_on_that_alone_is_the_same(comparison: Comparison, table: pd.DataFrame) -> None:
     found = {
         (one.controller, one.phase): one
-        for one in equal_terms.at_equal_bandwidth(cell_summaries(comparison, table), BANDWIDTHS)
+        for one in outcome.at_equal_bandwidth(cell_summaries(comparison, table), BANDWIDTHS)
     }
     assert found["slow", 0.2].survives == found["fast", 0.2].survives == pytest.approx(0.9)
     assert found["slow", 0.4].survives == found["fast", 0.4].survives == pytest.approx(0.7)
@@ -140,7 +140,7 @@ def test_at_equal_bandwidth_what_depends_on_that_alone_is_the_same(comparison: C
 
 
 def test_within_a_peak_torque_only_what_needs_no_more_counts(comparison: Comparison, table: pd.DataFrame) -> None:
-    found = [one for one in equal_terms.at_equal_torque(comparison, table) if one.value == 0.02]
+    found = [one for one in outcome.at_equal_torque(comparison, table) if one.value == 0.02]
     assert {one.torque for one in found if one.controller == "slow"} == {one.torque for one in found}
     for one in found:
         count = sum(

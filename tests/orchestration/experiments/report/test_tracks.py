@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from orchestration.experiments.report.blobs import Blobs
-from orchestration.experiments.report.layouts import layout_of
 from orchestration.experiments.report.model import ReportTrack
-from orchestration.experiments.report.tracks import Signals, Tracks
+from orchestration.experiments.report.tracks import Signals, Tracks, layout_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.layout import POSITION_ERROR, FlightLayout
 from orchestration.quadrotor.scenarios.translation import quadrotor

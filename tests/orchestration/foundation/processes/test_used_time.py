@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from orchestration.foundation.processes.family import Member
-from orchestration.foundation.processes.used_time import UsedTime
+from orchestration.foundation.processes.limit_enforcement import UsedTime
 
 PROCESSORS = 4
 """of the machine"""
