@@ -37,11 +37,11 @@ def bode(
         _draw(found.plot(), out)
     rows = [("loop", "gain margin", "phase margin", "delay margin", "crossover", "peak of sensitivity")]
     for loop in found.loops:
-        gain, phase, delay, crossover = loop.gain_margin, loop.phase_margin, loop.delay_margin, loop.crossover
+        phase, delay, crossover = loop.phase_margin, loop.delay_margin, loop.crossover
         rows.append(
             (
                 loop.output,
-                "infinite" if gain is None else f"{gain:.4g}",
+                ", ".join(f"{one.factor:.4g}" for one in loop.gain_margins) or "infinite",
                 "infinite" if phase is None else f"{phase:.4g}°",
                 "infinite" if delay is None else quantity(delay, "s"),
                 "-" if crossover is None else f"{crossover:.4g} rad/s",

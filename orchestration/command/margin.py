@@ -10,7 +10,7 @@ from orchestration.command.flags import FlightFlags, Timing, flight_options, req
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.terminal import in_columns, inform
 
 if TYPE_CHECKING:
     from orchestration.systems.system.request import Request
@@ -152,14 +152,28 @@ def linearise(
 ) -> CommandResult:
     """Linearise a loop about its operating point, from sample to sample: a component, and the rest of the loop.
 
-    With --json A, B, C and D of both, and the names of their inputs and outputs.
+    Poles are those of the closed loop, in the z-plane; frequency and damping are of log(z) / dt. With --json A, B, C
+    and D of both, and the names of their inputs and outputs.
     """
     from orchestration.theory.stability.linearise import linearise as linearised_loop
 
     loop = linearised_loop(request_from(scenario, flags, timing), component)
     halves = {loop.name: loop.component, "rest": loop.rest}
-    document = {"name": loop.name, "component": _matrices(loop.component), "rest": _matrices(loop.rest)}
+    document = {
+        "name": loop.name,
+        "component": _matrices(loop.component),
+        "rest": _matrices(loop.rest),
+        "poles": [dataclasses.asdict(pole) for pole in loop.poles],
+    }
     lines = [f"{name:<17}  {_summary(half)}" for name, half in halves.items()]
+    rows = [("pole", "size", "frequency", "damping")]
+    for pole in loop.poles:
+        if pole.imaginary >= 0.0:
+            size, damping = abs(complex(pole.real, pole.imaginary)), pole.damping
+            place = f"{pole.real:.4f}" + (f" ± {pole.imaginary:.4f}j" if pole.imaginary else "")
+            damped = "-" if damping is None else f"{damping:.3f}"
+            rows.append((place, f"{size:.4f}", f"{pole.frequency:.4g} rad/s", damped))
+    lines += in_columns(rows, right=True) if loop.poles else ()
     return CommandResult(document=document, verdict=loop.verdict, lines=lines)
 
 

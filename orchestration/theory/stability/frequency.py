@@ -1,13 +1,13 @@
 """Loops in the frequency domain: each command's loop, the others closed, with its margins as a sampled loop."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
@@ -32,12 +32,11 @@ from orchestration.theory.stability.linearise import (
 )
 from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
 from orchestration.theory.stability.operating_point import deterministic
+from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.gallery import Figures
-
-Complexes = npt.NDArray[np.complex128]
 
 LOWEST = 1e-5
 """Lowest frequency, as a share of the highest"""
@@ -58,6 +57,17 @@ BEYOND = 1.5
 
 @passable
 @dataclass(frozen=True, kw_only=True)
+class GainMargin:
+    """A factor on a command beyond which the loop is unstable."""
+
+    factor: float
+    """The factor: below 1 the loop has to keep more of its gain, above 1 it stands no more."""
+    frequency: float
+    """Where the loop gain times the factor is -1 [rad/s]; 0: the loop drifts away."""
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
 class LoopMargins:
     """The loop of one command, cut where it leaves the component, and its margins."""
 
@@ -67,6 +77,8 @@ class LoopMargins:
     """The command, as COMPONENT.VARIABLE."""
     gain_margin: float | None
     """The factor on the command nearest to 1 at which the loop becomes unstable; None: infinite."""
+    gain_margins: tuple[GainMargin, ...]
+    """The nearest such factor below 1, and the one above, in rising order; a missing one: any factor on that side."""
     phase_margin: float | None
     """The smallest distance of the phase from that of -1 where the gain is 1 [deg]; None: it is nowhere 1."""
     delay_margin: float | None
@@ -103,11 +115,13 @@ class Bode:
         clock = f"sampled every {quantity(self.dt, 's')}"
         if not self.stable:
             return f"{stability_of(self.radius)}, {clock}: an unstable loop has no margins"
-        gains = [loop.gain_margin for loop in self.loops if loop.gain_margin is not None]
+        factors = [one.factor for loop in self.loops for one in loop.gain_margins]
+        below, above = [x for x in factors if x < 1.0], [x for x in factors if x > 1.0]
+        gains = [f"{one:.3g}" for one in (max(below, default=None), min(above, default=None)) if one is not None]
         phases = [loop.phase_margin for loop in self.loops if loop.phase_margin is not None]
         delays = [loop.delay_margin for loop in self.loops if loop.delay_margin is not None]
         margins = [
-            f"gain margin {min(gains, key=lambda one: abs(math.log(one))):.3g}" if gains else "infinite gain margin",
+            f"gain margin{'s' * (len(gains) - 1)} {' and '.join(gains)}" if gains else "infinite gain margin",
             f"phase margin {min(phases, key=abs):.3g}°" if phases else "infinite phase margin",
             f"delay margin {quantity(min(delays), 's')}" if delays else "infinite delay margin",
         ]
@@ -200,13 +214,15 @@ def _margins(
         return complex(loop_gains(loop, np.array([frequency]))[i, 0])
 
     output = f"{loop.name}.{loop.component.outputs[i]}"
+    gain_margins = tuple(_gain_margins(loop, i, frequencies, gain, gain_at))
     crossings = [_root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in _changes(frequencies, np.abs(gain) - 1.0)]
     phases = {w: _phase_margin(gain_at(w)) for w in crossings}
     crossover = min(phases, key=lambda w: abs(phases[w]), default=None)
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
-        gain_margin=_gain_margin(loop, i, frequencies, gain, gain_at),
+        gain_margin=min((one.factor for one in gain_margins), key=_away_from_one, default=None),
+        gain_margins=gain_margins,
         phase_margin=None if crossover is None else math.degrees(phases[crossover]),
         delay_margin=_delay_margin(loop, i, crossings, gain_at, late),
         crossover=crossover,
@@ -219,18 +235,27 @@ def _phase_margin(gain: complex) -> float:
     return float(np.angle(-gain))
 
 
-def _gain_margin(
+def _gain_margins(
     loop: Linearised, i: int, frequencies: Floats, gain: Complexes, gain_at: Callable[[float], complex]
-) -> float | None:
-    """The factor nearest to 1 beyond which the loop is unstable, as its eigenvalues confirm."""
-    ends = [gain_at(w) for w in (0.0, math.pi / loop.rest.dt) if _is_finite_at(loop, w)]
-    inner = [gain_at(_root(lambda w: gain_at(w).imag, *pair)) for pair in _changes(frequencies, gain.imag)]
-    factors = [-1.0 / each.real for each in [*ends, *inner] if each.real < 0.0]
-    for factor in sorted(factors, key=lambda one: abs(math.log(one))):
-        away = math.copysign(PROVED, factor - 1.0)
-        if radius_with(loop, i, factor * (1.0 - away)) < 1.0 <= radius_with(loop, i, factor * (1.0 + away)):
-            return factor
-    return None
+) -> Iterator[GainMargin]:
+    """The factors nearest to 1, below and above, beyond which the loop is unstable, as its eigenvalues confirm."""
+    ends = [w for w in (0.0, math.pi / loop.rest.dt) if _is_finite_at(loop, w)]
+    inner = [_root(lambda w: gain_at(w).imag, *pair) for pair in _changes(frequencies, gain.imag)]
+    found = [GainMargin(factor=-1.0 / gain_at(w).real, frequency=w) for w in [*ends, *inner] if gain_at(w).real < 0.0]
+    nearest = sorted(found, key=lambda one: _away_from_one(one.factor))
+    for side in (-1.0, 1.0):
+        of_side = (one for one in nearest if side * (one.factor - 1.0) > 0.0)
+        yield from islice((one for one in of_side if _ends_stability(loop, i, one.factor)), 1)
+
+
+def _ends_stability(loop: Linearised, i: int, factor: float) -> bool:
+    """Whether the loop is stable with a factor on one command that is a little nearer to 1, and not beyond."""
+    away = math.copysign(PROVED, factor - 1.0)
+    return radius_with(loop, i, factor * (1.0 - away)) < 1.0 <= radius_with(loop, i, factor * (1.0 + away))
+
+
+def _away_from_one(factor: float) -> float:
+    return abs(math.log(factor))
 
 
 def _delay_margin(

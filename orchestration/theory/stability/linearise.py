@@ -25,6 +25,7 @@ from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
 from orchestration.theory.stability.matrices import of_samples
 from orchestration.theory.stability.period_map import period_map
+from orchestration.theory.stability.poles import Pole, as_poles, poles_of
 from orchestration.theory.stability.state_space import StateSpace, reduced
 
 Found = TypeVar("Found")
@@ -48,6 +49,8 @@ class Linearised:
     radius: float
     """The spectral radius of the whole loop, closed, over a period, with what its halves leave out: below 1 small
     deviations decay."""
+    poles: tuple[Pole, ...]
+    """The poles of the whole loop, as `radius`, the slowest first, without those at 0."""
 
     @property
     def verdict(self) -> str:
@@ -99,11 +102,13 @@ def cut_open(loop: AtRest, name: str) -> Linearised:
     sampling = loop.simulation.system.components[name].sampling
     assert sampling is not None
     rest = rest_of_loop(loop, name)
+    whole = period_map(loop)
     return Linearised(
         name=name,
         component=StateSpace(**vars(of_samples(loop.tangents[name], sampling.period)), dt=rest.dt),
         rest=rest,
-        radius=float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0)),
+        radius=float(np.abs(np.linalg.eigvals(whole)).max(initial=0.0)),
+        poles=as_poles(poles_of(whole), rest.dt),
     )
 
 

@@ -1,6 +1,9 @@
 """Figures of loops: over the frequency, after a step, and their poles over a quantity."""
 
+import math
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
@@ -9,7 +12,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.quantities import setting
-from orchestration.theory.stability.frequency import Bode, Complexes
+from orchestration.theory.stability.frequency import Bode, LoopMargins
+from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step_response import Step
 
@@ -18,21 +22,22 @@ SHOWN = 1.4
 
 
 def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
-    """The gain of each loop, its phase, and its sensitivity; a dot is where the gain is 1."""
+    """The gain of each loop, its phase, and its sensitivity; lines are gain and phase margins, at their crossovers."""
     figure = style.figure(66.0)
     above, middle, below = figure.subplots(3, sharex=True)
+    above.set_yscale("log")
+    below.set_yscale("log")
     for i, (gain, loop) in enumerate(zip(result.gains, result.loops, strict=False)):
-        how = {"color": CYCLE[i % len(CYCLE)], "linestyle": DASHES[i % len(DASHES)]}
+        color = CYCLE[i % len(CYCLE)]
+        how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
         phase = _phase(gain)
-        above.plot(result.frequencies, np.abs(gain), label=loop.output, **how)
+        label = f"{loop.output}: {_sizes(loop)}" if len(result.loops) > 1 else loop.output
+        above.plot(result.frequencies, np.abs(gain), label=label, **how)
         middle.plot(result.frequencies, phase, **how)
         below.plot(result.frequencies, np.abs(1.0 / (1.0 + gain)), **how)
-        if loop.crossover is not None:
-            above.plot(loop.crossover, 1.0, "o", color=how["color"])
-            middle.plot(loop.crossover, np.interp(loop.crossover, result.frequencies, phase), "o", color=how["color"])
+        _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=len(result.loops) == 1)
     for axes in (above, below):
         axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
-        axes.set_yscale("log")
     middle.axhline(-180.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.yaxis.set_major_locator(MultipleLocator(90.0))
     above.set(ylabel="loop gain |L|", xscale="log")
@@ -41,6 +46,35 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     below.set_xlim(result.frequencies[0], result.frequencies[-1])
     figure.legend(loc="outside lower center", ncols=2)
     return figure
+
+
+def _sizes(loop: LoopMargins) -> str:
+    """The margins of a loop in the legend, where those of several loops would hide each other."""
+    sizes = [f"× {one.factor:.3g}" for one in loop.gain_margins]
+    return ", ".join([*sizes, "infinite" if loop.phase_margin is None else f"{loop.phase_margin:.3g}°"])
+
+
+def _mark_margins(
+    panels: tuple[Axes, Axes], loop: LoopMargins, frequencies: Floats, phase: Floats, color: str, *, labelled: bool
+) -> None:
+    """The margins as lines at their crossovers, from where they would be none, with their sizes beside the middle."""
+    above, middle = panels
+    lines = [
+        (above, max(one.frequency, frequencies[0]), 1.0, 1.0 / one.factor, f"× {one.factor:.3g}")
+        for one in loop.gain_margins
+    ]
+    if loop.crossover is not None and loop.phase_margin is not None:
+        above.plot(loop.crossover, 1.0, "o", color=color)
+        reached = float(np.interp(loop.crossover, frequencies, phase))
+        lines.append((middle, loop.crossover, reached - loop.phase_margin, reached, f"{loop.phase_margin:.3g}°"))
+    for axes, at, none, end, size in lines:
+        axes.plot([at, at], [none, end], color=color, linewidth=2.0, clip_on=False)
+        place = math.sqrt(none * end) if axes is above else 0.5 * (none + end)
+        if labelled:
+            axes.annotate(
+                size, (at, place), xytext=(4.0, 0.0), textcoords="offset points", verticalalignment="center",
+                color=color,
+            )  # fmt: skip
 
 
 def _phase(gain: Complexes) -> Floats:

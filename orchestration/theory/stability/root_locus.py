@@ -24,10 +24,10 @@ from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
-from orchestration.theory.stability.frequency import Complexes
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
 from orchestration.theory.stability.period_map import period_map
+from orchestration.theory.stability.poles import Complexes, poles_of
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.gallery import Figures
@@ -41,8 +41,6 @@ ON_CIRCLE = 1e-7
 """Distance of a spectral radius from 1 at which a crossing is found"""
 TRIALS = 40
 """Most values that are tried for a crossing"""
-NO_RANK = 1e-10
-"""Singular value, as a share of the largest, of what a period forgets"""
 
 
 @passable
@@ -210,15 +208,3 @@ def _crossing(value: float, poles: Complexes, period: float, *, leaves: bool) ->
         value=value, leaves=leaves, real=pole.real, imaginary=pole.imag,
         frequency=abs(math.atan2(pole.imag, pole.real)) / period,
     )  # fmt: skip
-
-
-def poles_of(matrix: Floats) -> Complexes:
-    """The eigenvalues of a matrix without those at 0, which rounding would scatter where they are multiple."""
-    while len(matrix):
-        left, sizes, _ = np.linalg.svd(matrix)
-        rank = int((sizes > NO_RANK * max(1.0, float(sizes[0]))).sum())
-        if rank == len(matrix):
-            break
-        matrix = left[:, :rank].T @ matrix @ left[:, :rank]
-    found: Complexes = np.linalg.eigvals(matrix).astype(complex)
-    return found[np.argsort(-np.abs(found), kind="stable")]

@@ -57,12 +57,30 @@ def test_margins_are_those_of_python_control(name: str) -> None:
     (loop,) = found.loops
     assert found.stable
     assert loop.gain_margin == pytest.approx(gain, rel=1e-4)
+    # All factors that turn the loop gain into -1, of which it has those that end stability: a loop of them is stable
+    # in between.
+    every, _, _, at_phase, *_ = control.stability_margins(loop_gain(name), returnall=True)
+    nearest = [max(every[every < 1.0]), min(every[every > 1.0])]
+    assert [one.factor for one in loop.gain_margins] == pytest.approx(nearest, rel=1e-4)
+    at = [at_phase[list(every).index(factor)] for factor in nearest]
+    assert [one.frequency for one in loop.gain_margins] == pytest.approx(at, rel=1e-3, abs=1e-3)
     assert (loop.phase_margin, loop.crossover) == (pytest.approx(phase, rel=1e-6), pytest.approx(crossover, rel=1e-6))
     assert loop.sensitivity_peak == found.sensitivity_peak == pytest.approx(1.0 / distance, rel=1e-4)
     at = loop_gain(name)(np.exp(1j * np.array([loop.crossover, 1.0]) * found.dt))
     assert abs(at[0]) == pytest.approx(1.0, rel=1e-6)
     assert 180.0 + math.degrees(np.angle(at[0])) == pytest.approx(loop.phase_margin, abs=1e-4)
     assert np.interp(1.0, found.frequencies, np.abs(found.gains[0])) == pytest.approx(abs(at[1]), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_poles_with_their_damping_are_those_of_python_control(name: str) -> None:
+    control = pytest.importorskip("control")
+    frequency, damping, poles = control.damp(control.feedback(loop_gain(name), 1.0), doprint=False)
+    found, order = linearise(system_of(name)).poles, np.argsort(-np.abs(poles), kind="stable")
+    assert [[one.frequency, one.damping] for one in found] == pytest.approx(
+        np.column_stack([frequency, damping])[order], rel=1e-5
+    )
+    assert sorted(complex(one.real, one.imaginary).imag for one in found) == pytest.approx(sorted(poles.imag))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -103,7 +121,7 @@ def test_a_loop_of_one_command_has_the_others_closed() -> None:
             outputs=("",) * outputs,
         )  # fmt: skip
 
-    loop = Linearised(name="law", component=half(2, 2, 3, 0.5), rest=half(4, 3, 2, 0.0), radius=0.5)
+    loop = Linearised(name="law", component=half(2, 2, 3, 0.5), rest=half(4, 3, 2, 0.0), radius=0.5, poles=())
     z = np.exp(0.7j)
 
     def at(of: StateSpace) -> np.ndarray:
@@ -136,15 +154,24 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     file = EXAMPLES / "dc_servo" / "system.toml"
     document = json.loads(main("bode", file, "--json", "--out", tmp_path).stdout)
     assert document.keys() == {"verdict", "dt", "stable", "sensitivity_peak", "loops"}
-    assert document["loops"] == [dataclasses.asdict(loop) for loop in bode_of("dc_servo").loops]
+    loops = [dataclasses.asdict(loop) for loop in bode_of("dc_servo").loops]
+    assert document["loops"] == json.loads(json.dumps(loops))
     assert document["verdict"] == (
-        "stable, sampled every 6 ms: gain margin 3.25, phase margin 33.7°, delay margin 11.5 ms (small deviations)"
+        "stable, sampled every 6 ms: gain margins 0.169 and 3.25, phase margin 33.7°, delay margin 11.5 ms "
+        "(small deviations)"
     )
     stepped = json.loads(main("step", file, "--json", "--out", tmp_path).stdout)
     assert {"rise_time", "overshoot", "settling_time", "steady_state"} < stepped.keys()
     assert stepped["verdict"].startswith("a step on controller.u settles in 300 ms, overshoot 54.7 %, 100 % taken back")
     for name in ("bode", "step"):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    gain, _, sensitivity = bode_of("dc_servo").plot()["bode"].axes
-    assert gain.lines[1].get_xydata() == pytest.approx(np.array([[51.097, 1.0]]), rel=1e-4)  # the dot at the crossover
+    gain, phase, sensitivity = bode_of("dc_servo").plot()["bode"].axes
+    (loop,) = bode_of("dc_servo").loops
+    dot = [[loop.crossover], [1.0]]  # where the gain is 1
+    expected = [dot, *([[one.frequency] * 2, [1.0, 1.0 / one.factor]] for one in loop.gain_margins)]
+    for line, ends in zip(gain.lines[1:], expected, strict=False):
+        assert np.transpose(line.get_xydata()) == pytest.approx(np.array(ends))
+    turned = [[loop.crossover] * 2, [-180.0, loop.phase_margin - 180.0]]
+    assert np.transpose(phase.lines[1].get_xydata()) == pytest.approx(np.array(turned), rel=1e-4)
+    assert [text.get_text() for axes in (gain, phase) for text in axes.texts] == ["× 0.169", "× 3.25", "33.7°"]
     assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == bode_of("dc_servo").sensitivity_peak

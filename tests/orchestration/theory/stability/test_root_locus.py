@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestration.systems.system.paths import changed
-from orchestration.theory.stability.root_locus import poles_of
+from orchestration.theory.stability.poles import poles_of
 from quadcosim import UsageError, bode, linearise, locus
 from tests.commands import Main
 from tests.examples.common import example

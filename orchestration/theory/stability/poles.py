@@ -1,0 +1,56 @@
+"""The poles of a loop over a period: without what is forgotten, and as those of a loop in continuous time."""
+
+import cmath
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.processes.passable import passable
+
+NO_RANK = 1e-10
+"""Singular value, as a share of the largest, of what a period forgets"""
+DRIFT = 1e-9
+"""Distance of a pole from 1 at which it has neither damping nor a direction"""
+
+Complexes = npt.NDArray[np.complex128]
+
+
+@passable
+@dataclass(frozen=True, kw_only=True)
+class Pole:
+    """A pole z of a sampled loop, and that of continuous time, s = log(z) / dt."""
+
+    real: float
+    """Real part of z."""
+    imaginary: float
+    """Imaginary part of z."""
+    frequency: float
+    """Natural frequency |s| [rad/s]; of an aperiodic motion the rate of its decay or growth."""
+    damping: float | None
+    """Damping ratio -Re(s) / |s|: 1 aperiodic, 0 undamped, below 0 growing; None: s = 0."""
+
+
+def as_poles(found: Complexes, dt: float) -> tuple[Pole, ...]:
+    """Poles of the z-plane, of samples `dt` [s] apart, with frequency and damping."""
+    return tuple(_as_pole(complex(z), dt) for z in found)
+
+
+def _as_pole(z: complex, dt: float) -> Pole:
+    is_drift = abs(z - 1.0) < DRIFT
+    s = 0j if is_drift else cmath.log(z) / dt
+    damping = None if is_drift else -s.real / abs(s)
+    return Pole(real=z.real, imaginary=z.imag, frequency=abs(s), damping=damping)
+
+
+def poles_of(matrix: Floats) -> Complexes:
+    """The eigenvalues of a matrix without those at 0, which rounding would scatter where they are multiple."""
+    while len(matrix):
+        left, sizes, _ = np.linalg.svd(matrix)
+        rank = int((sizes > NO_RANK * max(1.0, float(sizes[0]))).sum())
+        if rank == len(matrix):
+            break
+        matrix = left[:, :rank].T @ matrix @ left[:, :rank]
+    found: Complexes = np.linalg.eigvals(matrix).astype(complex)
+    return found[np.argsort(-np.abs(found), kind="stable")]
