@@ -21,7 +21,7 @@ from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps
 from orchestration.experiments.studies.figures import save
-from orchestration.experiments.studies.shares import GOOD
+from orchestration.experiments.studies.shares import GOOD, RANDOM
 from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.style import SCREEN, Style
@@ -105,7 +105,8 @@ def _maps(
     laws = Axis(name=CONTROLLER, targets=(), values=tuple(one.name for one in comparison.controllers))
     for (vehicle, condition), rows in table.groupby([VEHICLE, CONDITION], sort=False):
         for fate, has in FATES.items():
-            draw = partial(_map, rows.assign(good=has(rows)), (comparison.axis, second), laws, _WORDS[fate], units)
+            repeated = rows.assign(**{GOOD: has(rows), RANDOM: True})  # as initial conditions are drawn
+            draw = partial(_map, repeated, (comparison.axis, second), laws, _WORDS[fate], units)
             yield from keep(draw, folder / f"map_{fate}_{_file_name((vehicle, condition))}")
 
 
