@@ -89,7 +89,7 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table
         inform(f"{summary.failed} runs failed: runs.csv shows why")
     content = as_json(comparison, compared.outcome, compared.bandwidths)
     document = {**content, "follows": summary.follows, "files": compared.written}
-    verdict = verdicts.of_comparison(comparison, compared.outcome)
+    verdict = compared.verdict
     if table is None:
         lines = list(comparison_text.lines(comparison, compared.outcome))
         return CommandResult(document=document, verdict=verdict, lines=lines, good=not summary.failed)
@@ -129,4 +129,4 @@ def tune(
         load_tuning(tuning), out=out, workers=workers, dask=dask, engine=engine_choice(engine), command=command
     )
     written = result_of_files(tuned.written)
-    return dataclasses.replace(written, verdict=verdicts.of_tuning(tuned))
+    return dataclasses.replace(written, verdict=tuned.verdict)

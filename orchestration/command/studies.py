@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import exact, verdicts
+from orchestration.command import exact
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
@@ -45,7 +45,6 @@ def sweep(
     )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} of them new{failed}"]
-    verdict = verdicts.of_counts(summary.outcomes, summary.total)
     if summary.agreement is not None:
         lines.append(f"engine {summary.engine}: {summary.agreement}")
     if note := note_on_engines(summary.engines):
@@ -54,7 +53,7 @@ def sweep(
         inform(f"follows {each}")
     keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")
     document = {name: getattr(summary, name) for name in keys}
-    return CommandResult(document=document, verdict=verdict, lines=lines, good=not summary.failed)
+    return CommandResult(document=document, verdict=summary.verdict, lines=lines, good=not summary.failed)
 
 
 def _warn_if_means_are_infinite(study: "Study") -> None:
@@ -72,6 +71,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     from orchestration.experiments.studies.store import note_on_engines, open_for_reading, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
+    from orchestration.simulation.results.objectives import how_runs_ended
     from orchestration.simulation.workers.batching import LaneAgreement
 
     loaded = load_study(study)
@@ -91,7 +91,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
         lines.append(note)
     document = {"path": path, "total": total, "done": done, "failed": failed, "missing": missing}
     document |= {"engines": engines, "agreement": agreement}
-    return CommandResult(document=document, verdict=verdicts.of_counts(outcomes, total), lines=lines)
+    return CommandResult(document=document, verdict=how_runs_ended(outcomes, total), lines=lines)
 
 
 def export(

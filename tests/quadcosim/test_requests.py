@@ -4,11 +4,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import quadcosim
+from orchestration.foundation.basics.documents import read_toml
 from quadcosim import Result, Scenario, UsageError
 from tests.native import NATIVE, assert_the_same
+from tests.places import EXAMPLES
 
 SHORT = NATIVE.with_changes(stop_time=0.1)
 ENTRIES: dict[str, Callable[[Any], object]] = {
@@ -68,12 +71,26 @@ def test_parameters_of_a_side_are_changed_by_their_names() -> None:
     assert Scenario().with_changes(reference={"name": "circle", "radius": 2.0}).reference.name == "circle"
 
 
-@pytest.mark.parametrize("what", ["Study", "Comparison", "Tuning"])
-def test_the_path_of_a_file_of_many_runs_is_refused_with_what_reads_it(what: str, tmp_path: Path) -> None:
-    entries: dict[str, Callable[[Any], object]] = {
-        "Study": quadcosim.sweep,
-        "Comparison": quadcosim.compare,
-        "Tuning": lambda tuning: quadcosim.tune(tuning, out=tmp_path),
-    }
-    with pytest.raises(UsageError, match=f"^'many.toml': expected a {what}, which load_{what.lower()} reads from"):
-        entries[what]("many.toml")
+MANY: dict[str, tuple[Callable[[Any], Any], Callable[[Any], object]]] = {
+    "study": (quadcosim.load_study, quadcosim.sweep),
+    "comparison": (quadcosim.load_comparison, quadcosim.compare),
+    "tuning": (quadcosim.load_tuning, lambda tuning: quadcosim.tune(tuning, out="nowhere")),
+}
+
+
+@pytest.mark.parametrize("kind", MANY)
+def test_many_runs_are_asked_for_by_a_path_a_dictionary_or_an_object(kind: str) -> None:
+    load, start = MANY[kind]
+    path = EXAMPLES / "quadrotor" / f"{kind}.toml"
+    tables, loaded = read_toml(path, kind), load(path)
+    tables.pop("scenario", None)
+    for axis in (*tables.get("axes", ()), tables.get("axis", {})):
+        axis |= {"values": np.array(axis["values"])} if axis else {}
+    assert load({**tables, "base": loaded.base}) == loaded
+    assert load(loaded) is loaded
+    with pytest.raises(UsageError, match=rf"^many\.toml: expected a readable {kind} file: no such file"):
+        start("many.toml")
+    with pytest.raises(UsageError, match=r"^axees: no such key; expected one of .*base"):
+        start({**tables, "axees": []})
+    with pytest.raises(UsageError, match=f"^3: expected a {kind.title()}, the path of a file of one, or its tables"):
+        start(3)

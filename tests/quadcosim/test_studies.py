@@ -11,7 +11,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import quadcosim
-from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.simulation.figures.style import STYLES
 from quadcosim import Axis, QuadcosimError, Result, Scenario, Study, Swept, Timing, UsageError
 from tests.orchestration.experiments.tuning.test_tuning import FILE
@@ -126,6 +125,7 @@ def test_functions_and_lanes_do_not_go_together_and_an_error_in_one_is_that_of_i
 def test_a_notebook_shows_what_became_of_the_runs(swept: Swept) -> None:
     assert ">bounded<" in swept._repr_html_()
     assert ">2<" in swept._repr_html_()
+    assert swept.verdict == "2 bounded of 2 runs"
 
 
 def test_a_sweep_draws_what_its_criterion_is_about_or_what_is_asked_for(swept: Swept) -> None:
@@ -205,7 +205,7 @@ def test_a_tuning_gives_its_searches_and_writes_their_files(tmp_path: Path) -> N
     text = FILE.replace("stop_time = 5.0", "stop_time = 0.05").replace("evaluations = 100", "evaluations = 1")
     (tmp_path / "few.toml").write_text(text.replace("seeds = [1, 2]", "seeds = [1]"))
     found = quadcosim.tune(
-        load_tuning(tmp_path / "few.toml"),
+        tmp_path / "few.toml",
         out=tmp_path / "gains",
         folder=tmp_path / "kept",
         progress=None,
@@ -214,6 +214,7 @@ def test_a_tuning_gives_its_searches_and_writes_their_files(tmp_path: Path) -> N
     assert [path.name for path in found.written] == ["few_10ms.toml", "few_20ms.toml"]
     assert found.to_pandas()["period"].tolist() == [0.01, 0.02]
     assert set(found.best) == {0.01, 0.02}
+    assert found.verdict.startswith("best of 2 searches: 10 ms cost ")
     assert "controller.gain.attitude" in found.to_pandas()
     assert "by: quadcosim.tune" in found.written[0].read_text()
 

@@ -44,6 +44,11 @@ def test_a_name_that_a_result_does_not_have_is_answered_with_its_names(of: str, 
     assert name not in getattr(result, of)
 
 
+def test_a_name_that_differs_by_capitals_only_is_proposed_first(result: Result) -> None:
+    with pytest.raises(UsageError, match=r"did you mean plant\.position\.x or plant\.position\.[yz]"):
+        result.signals["plant.position.X"]
+
+
 @pytest.mark.parametrize("argument", ["outputs", "record"])
 def test_a_name_alone_is_no_list_of_names(argument: str) -> None:
     name: Any = "position_rmse"

@@ -18,7 +18,7 @@ from orchestration.experiments.comparison.design import (
 )
 from orchestration.experiments.studies.axes import Axis, Value
 from orchestration.experiments.studies.linked_settings import Key
-from orchestration.experiments.studies.study_file import AxisTable, axis_of, control_loop_of, load
+from orchestration.experiments.studies.study_file import AxisTable, FileLike, axis_of, control_loop_of, load
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed
 from orchestration.foundation.basics.records import record
@@ -95,12 +95,13 @@ class ComparisonFile:
     """Instead of `scenario`, the tables of a scenario file."""
 
 
-def load_comparison(path: str | Path) -> Comparison:
+def load_comparison(comparison: Comparison | FileLike) -> Comparison:
     """Read a comparison file; paths in it are relative to its folder.
 
+    Its content may be given as a dictionary, in which `base` may be a scenario; a comparison is returned as it is.
     Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
     """
-    return load(Path(path), "comparison file", ComparisonFile, _comparison)
+    return load(comparison, "Comparison", (Comparison,), ComparisonFile, _comparison)
 
 
 def _comparison(file: ComparisonFile, path: Path) -> Comparison:

@@ -10,13 +10,16 @@ from fmu_kit.new_files import new_files
 from orchestration.experiments.comparison.bandwidth import Bandwidths, bandwidths
 from orchestration.experiments.comparison.cells import CellSummary, cell_summaries, table_of_runs
 from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.comparison.outcome import Outcome, outcome_of, write
 from orchestration.experiments.studies.store import store_path
+from orchestration.experiments.studies.study_file import FileLike
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.experiments.studies.swept import Swept
 from orchestration.experiments.studies.table import export, frame, units_in
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.progress import CountProgress
 from orchestration.foundation.basics.terminal import inform
 from orchestration.simulation.engines.resolved import check_against_fmus
@@ -40,8 +43,8 @@ if TYPE_CHECKING:
 class Compared:
     """The result of a comparison."""
 
-    axis: str
-    """The name of its axis; of two, that of the first."""
+    comparison: Comparison
+    """The comparison as it was run."""
     summary: Swept
     """The summary of the sweep of its runs, with the path of the store."""
     table: "pd.DataFrame"
@@ -52,6 +55,25 @@ class Compared:
     """Cells, limits, pairs and fronts, with their intervals."""
     written: list[Path]
     """The tables and pictures beside the store."""
+
+    @property
+    def verdict(self) -> str:
+        """Up to which value of the axis half of the runs survive, by controller, where first it was measured."""
+        outcome = self.outcome
+        half = [one for one in outcome.limits if (one.fate, one.share) == ("survive", "half")]
+        unit = "s" if self.comparison.is_in_seconds else None
+        if not half:
+            counts = [f"{cell.controller} {cell.survives.count} of {cell.count}" for cell in outcome.cells]
+            return f"no limits, as cells are missing; survive: {some(counts)}" if counts else "no cell has runs"
+        places = dict.fromkeys((one.vehicle, one.condition) for one in half)
+        first = next(iter(places))
+        reached = [
+            f"{one.controller} to {quantity(one.value, unit)}" for one in half if (one.vehicle, one.condition) == first
+        ]
+        others = f" ({len(places) - 1} more below)" if len(places) > 1 else ""
+        where = f"{first[0]}, {first[1]}"
+        axis = self.comparison.axis.name
+        return f"half of the runs survive over {axis}: {some(reached)}; {where}{others}"
 
     def __repr__(self) -> str:
         return (
@@ -85,7 +107,7 @@ class Compared:
 
 @needs("filelock", "pandas")
 def compare(
-    comparison: Comparison,
+    comparison: Comparison | FileLike,
     *,
     folder: str | Path | None = None,
     workers: int = 1,
@@ -99,11 +121,12 @@ def compare(
 ) -> Compared:
     """Run what is missing of a comparison, and write its tables and pictures beside its store.
 
+    `comparison` may be the path of its file, or the content of the file as a dictionary, as `load_comparison` takes
+    them.
     `folder`, `workers`, `dask`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises
     what this does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
     """
-    if not isinstance(comparison, Comparison):
-        raise UsageError(f"{shown(repr(comparison))}: expected a Comparison, which load_comparison reads from a file")
+    comparison = load_comparison(comparison)
     summary = sweep(
         comparison.study, folder=folder, workers=workers, dask=dask, engine=engine, time_limit=time_limit,
         progress=progress, announce=announce,
@@ -121,7 +144,7 @@ def compare(
 
             written += pictures.draw(comparison, outcome, table, new, style or SCREEN, units=units_in(summary.path))
     return Compared(
-        axis=comparison.axis.name, summary=summary, table=table, bandwidths=known, outcome=outcome,
+        comparison=comparison, summary=summary, table=table, bandwidths=known, outcome=outcome,
         written=[place / path.name for path in written],
     )  # fmt: skip
 

@@ -1,16 +1,17 @@
 """Reads study files."""
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar, cast
 
 from orchestration.components.building.models import PATHS
 from orchestration.experiments.studies.axes import Axis, Scale, Value, span
 from orchestration.experiments.studies.linked_settings import LinkedSettings
 from orchestration.experiments.studies.study import CONTROLLER, Study, names_fmu
-from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, prefixed
+from orchestration.foundation.basics.documents import copied_tables, read_toml, tables_in
+from orchestration.foundation.basics.errors import UsageError, prefixed, shown
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.simulation.requests.request import load_request, request_from_tables
@@ -67,12 +68,17 @@ class StudyFile:
     """The runs whose signals are kept, by their index in the design; true for all."""
 
 
-def load_study(path: str | Path) -> Study:
+FileLike: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]
+"""The path of a file, or its content as a dictionary"""
+
+
+def load_study(study: Study | FileLike) -> Study:
     """Read a study file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
+    Its content may be given as a dictionary, in which `base` may be a system or a scenario; a study is returned as it
+    is. Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
     """
-    return load(Path(path), "study file", StudyFile, _study)
+    return load(study, "Study", (Study,), StudyFile, _study)
 
 
 class HasBase(Protocol):
@@ -91,9 +97,30 @@ File = TypeVar("File")
 Result = TypeVar("Result")
 
 
-def load(path: Path, kind: str, shape: type[File], make: Callable[[File, Path], Result]) -> Result:
-    """Read a file of a shape and convert it by `make`; raises `UsageError` that names the file."""
-    tables = read_toml(path, kind)
+def load(
+    given: object,
+    name: str,
+    kinds: tuple[type, ...],
+    shape: type[File],
+    make: Callable[[File, Path], Result],
+) -> Result:
+    """What is one of some `kinds`, else that which `make` makes of a file of a shape, or of its content.
+
+    `name` is that of the kinds in errors. Raises `UsageError` that names the file.
+    """
+    if isinstance(given, kinds):
+        return cast("Result", given)
+    if isinstance(given, Mapping):
+        tables = copied_tables(given)
+        if isinstance(base := tables.get("base"), Request):
+            tables["base"] = tables_in(base.to_toml())
+        return make(parsed(tables, shape), Path())
+    if not isinstance(given, (str, os.PathLike)):
+        raise UsageError(
+            f"{shown(repr(given))}: expected a {name}, the path of a file of one, or its tables as a dictionary"
+        )
+    path = Path(given)
+    tables = read_toml(path, f"{name.lower()} file")
     with prefixed(f"{path}: "):
         return make(parsed(tables, shape), path)
 

@@ -19,8 +19,9 @@ from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
 from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, study_parts
 from orchestration.experiments.studies.store_columns import UNITS
 from orchestration.experiments.studies.study import StartValues, Study
+from orchestration.experiments.studies.study_file import FileLike, load_study
 from orchestration.experiments.studies.swept import Swept
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
@@ -53,7 +54,7 @@ _ANNOUNCED = 3
 
 @explains_missing
 def sweep(
-    study: Study,
+    study: Study | FileLike,
     *,
     metrics: Mapping[str, Callable[[Result], float | None]] | None = None,
     folder: str | Path | None = None,
@@ -67,6 +68,7 @@ def sweep(
 ) -> Swept:
     """Run what the store of a study does not have, writing each row as it comes.
 
+    `study` may be the path of its file, or the content of the file as a dictionary, as `load_study` takes them.
     `metrics` are further metrics by name: functions of a run's `Result` that return a number, or None for no value.
     Their source is executed in other processes and identifies the run, so a function must contain everything that it
     uses, except modules. Such runs are executed one at a time.
@@ -83,8 +85,7 @@ def sweep(
     the difference; `QuadcosimError` for failures not caused by a run, without a row, as if `auto` cannot have the
     engine of a store; `KeyboardInterrupt`, stating how far it came, after Ctrl-C.
     """
-    if not isinstance(study, Study):
-        raise UsageError(f"{shown(repr(study))}: expected a Study, which load_study reads from a file")
+    study = load_study(study)
     _expect_workers(workers, dask)
     if time_limit is not None and not time_limit > 0.0:
         raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")

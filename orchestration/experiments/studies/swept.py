@@ -10,6 +10,7 @@ from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.simulation.results import html
+from orchestration.simulation.results.objectives import how_runs_ended
 from orchestration.simulation.workers.batching import LaneAgreement
 
 if TYPE_CHECKING:
@@ -41,6 +42,11 @@ class Swept:
     """Agreement of runs in SIMD lanes with the same runs by FMUs; None if there were none."""
     follows: tuple[str, ...] = ()
     """The references of its runs and the components that follow them."""
+
+    @property
+    def verdict(self) -> str:
+        """How many runs of the store have ended in which way."""
+        return how_runs_ended(self.outcomes, self.total)
 
     def __repr__(self) -> str:
         return f"<Swept: {self._counts()}, in {self.path}>"

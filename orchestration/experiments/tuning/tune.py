@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from fmu_kit.new_files import new_files, write_atomically
+from orchestration.experiments.studies.study_file import FileLike
 from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
 from orchestration.experiments.tuning.record import open_record
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
-from orchestration.experiments.tuning.tuning_file import gains_text
+from orchestration.experiments.tuning.tuning_file import gains_text, load_tuning
 from orchestration.experiments.tuning.tuning_problem import Costs, SearchResult, TuningProblem, best_by_period
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
+from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.progress import ShareProgress, share_reporter
 from orchestration.foundation.basics.terminal import inform
 from orchestration.simulation.engines.master import BATCH
@@ -49,6 +51,12 @@ class Tuned:
         """By period [s], the search with the lowest cost."""
         return {one.period: one for one in best_by_period(self.searches)}
 
+    @property
+    def verdict(self) -> str:
+        """The lowest cost for each period."""
+        costs = [f"{quantity(period, 's')} cost {one.cost:.4g}, {one.judgement}" for period, one in self.best.items()]
+        return f"best of {len(self.searches)} searches: {some(costs, '; ')}"
+
     def __repr__(self) -> str:
         best = "; ".join(f"{period:g} s: {result.judgement}" for period, result in self.best.items())
         return f"<Tuned: {len(self.searches)} searches; {best}>"
@@ -79,7 +87,7 @@ class Tuned:
 
 @needs("cma", "filelock")
 def tune(
-    tuning: Tuning | ExactTuning,
+    tuning: Tuning | ExactTuning | FileLike,
     *,
     out: str | Path,
     folder: str | Path | None = None,
@@ -92,6 +100,7 @@ def tune(
 ) -> Tuned:
     """Tune the parameters of a controller, by runs or by exact expectations.
 
+    `tuning` may be the path of its file, or the content of the file as a dictionary, as `load_tuning` takes them.
     A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes or those of a
     `dask` scheduler, and an engine, as in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if
     available.
@@ -103,8 +112,7 @@ def tune(
 
     Raises `UsageError` for an invalid tuning, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
     """
-    if not isinstance(tuning, (Tuning, ExactTuning)):
-        raise UsageError(f"{shown(repr(tuning))}: expected a Tuning, which load_tuning reads from a file")
+    tuning = load_tuning(tuning)
     folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
     done: Sequence[SearchResult]
     if isinstance(tuning, Tuning):

@@ -5,7 +5,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 
-from orchestration.experiments.studies.study_file import AxisTable, axis_of, base_of, control_loop_of, load
+from orchestration.experiments.studies.study_file import AxisTable, FileLike, axis_of, base_of, control_loop_of, load
 from orchestration.experiments.tuning.exact import ExactTuning
 from orchestration.experiments.tuning.tuning import Tuning
 from orchestration.experiments.tuning.tuning_problem import SearchResult, TuningProblem
@@ -58,12 +58,13 @@ class TuningFile:
     """The same given here instead of in a separate file: its tables."""
 
 
-def load_tuning(path: str | Path) -> Tuning | ExactTuning:
+def load_tuning(tuning: Tuning | ExactTuning | FileLike) -> Tuning | ExactTuning:
     """Read a tuning file; paths in it are relative to its folder.
 
-    Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
+    Its content may be given as a dictionary, in which `base` may be a system or a scenario; a tuning is returned as it
+    is. Raises `UsageError` for a file that cannot be read, an unknown key (naming the known ones) or an invalid value.
     """
-    return load(Path(path), "tuning file", TuningFile, _tuning)
+    return load(tuning, "Tuning", (Tuning, ExactTuning), TuningFile, _tuning)
 
 
 def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:

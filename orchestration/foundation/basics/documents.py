@@ -85,6 +85,21 @@ def toml_of(text: str, path: str) -> dict[str, Any]:
     return tables
 
 
+def copied_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of tables that were made by code, in the types of a document: lists for tuples and arrays of NumPy."""
+    return {key: _copied(value) for key, value in tables.items()}
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return copied_tables(value)
+    if isinstance(value, (list, tuple, range)):
+        return [_copied(each) for each in value]
+    if isinstance(value, PurePath):
+        return str(value)
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def tables_in(text: str) -> dict[str, Any]:
     """The tables of TOML that this project has written, without checks."""
     tables: dict[str, Any] = tomllib.loads(text)

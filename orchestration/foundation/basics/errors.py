@@ -99,9 +99,13 @@ def no_such_key(table: str, key: str, known: Sequence[str], beside: str = "") ->
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """The end of a message about an unknown `name`: the `most` known names that are closest to it, if any is close."""
-    close = difflib.get_close_matches(name, list(known), n=most)
-    return f"; did you mean {' or '.join(close)}?" if close else ""
+    """The end of a message about an unknown `name`: the `most` known names that are closest to it, if any is close.
+
+    Capitals count as small letters: who writes `position.X` means `position.x`.
+    """
+    in_small = {each.casefold(): each for each in known}
+    close = difflib.get_close_matches(name.casefold(), list(in_small), n=most)
+    return f"; did you mean {' or '.join(in_small[each] for each in close)}?" if close else ""
 
 
 class UnknownNameError(UsageError, KeyError):

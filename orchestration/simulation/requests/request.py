@@ -1,13 +1,12 @@
 """Reads requests to run: a system file or a scenario of the quadrotor, both TOML; an SSP with its timing; an FMU."""
 
-import copy
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from orchestration.foundation.basics.documents import read_toml
+from orchestration.foundation.basics.documents import copied_tables, read_toml
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.simulation.requests.kinds import KINDS, RequestKind
 from orchestration.systems.system.file import is_system, system_from_tables
@@ -34,7 +33,7 @@ def request_of(request: RequestLike) -> Request:
     if isinstance(request, (str, os.PathLike)):
         return load_request(Path(request))
     if isinstance(request, Mapping):
-        return request_from_tables(copy.deepcopy(dict(request)), Path())
+        return request_from_tables(copied_tables(request), Path())
     if isinstance(request, type) or not isinstance(request, Request):
         expected = "a Scenario, a System, the path of a file of one, or its tables as a dictionary"
         raise UsageError(f"{shown(repr(request))}: expected {expected}")

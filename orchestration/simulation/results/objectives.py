@@ -26,6 +26,13 @@ PRINTED = ("wall_time", "largest_lateness", "engine")
 """Names that `run` prints beside them, where there are any"""
 
 
+def how_runs_ended(outcomes: Mapping[str | None, int], total: int) -> str:
+    """How many of some runs have ended in which way, the most frequent first; those without an outcome do not count."""
+    counts = sorted(((count, name) for name, count in outcomes.items() if name), reverse=True)
+    ended = ", ".join(f"{count} {name}" for count, name in counts)
+    return f"{ended or 'no outcome'} of {total} runs"
+
+
 def compute(
     system: System,
     spans: Spans,
