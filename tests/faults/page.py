@@ -25,9 +25,10 @@ def page(text: str, rows: list[dict[str, Any]]) -> str:
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
+    """All commands together, and those that left files otherwise than as before or new."""
     lines = ["", "| command | cases | files as before | new files | else |", "| --- | --- | --- | --- | --- |"]
-    names = list(dict.fromkeys(row["command"] for row in rows))
-    counted = [(name, Counter(row["outcome"] for row in rows if row["command"] == name)) for name in names]
+    bad = dict.fromkeys(row["command"] for row in rows if row["outcome"] not in GOOD)
+    counted = [(name, Counter(row["outcome"] for row in rows if row["command"] == name)) for name in bad]
     for name, counts in [*counted, ("all", Counter(row["outcome"] for row in rows))]:
         others = ", ".join(f"{counts[each]} {each}" for each in counts if each not in GOOD)
         lines.append(f"| {name} | {counts.total()} | {counts['old']} | {counts['new']} | {others} |")
