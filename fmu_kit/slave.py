@@ -116,7 +116,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         elif "initial_dependencies" not in cls.__dict__:
             return
         for output in (v.name for v in cls.variables if v.causality == "output"):
-            expect_variables(cls, f"initial_dependencies of {output}", cls.initial_dependencies(output))
+            expect_variables(cls, f"initial_dependencies of {output}", cls.initial_dependencies(output) or ())
 
     @classmethod
     def _declare(cls, declared: list[Declaration]) -> None:
@@ -216,8 +216,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return cls.initialise is not Slave.initialise if declared is None else declared
 
     @classmethod
-    def initial_dependencies(cls, output: str) -> frozenset[str]:
-        """The inputs and parameters on which an output depends when initialisation ends.
+    def initial_dependencies(cls, output: str) -> frozenset[str] | None:
+        """The inputs and parameters on which an output depends when initialisation ends; None: any of them.
 
         Default: a state depends on its initial value if the model does not define `initialise`; otherwise all outputs
         depend on all parameters, and on all inputs if `depends_initially`.

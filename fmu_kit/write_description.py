@@ -163,12 +163,17 @@ def type_attributes(variable: Variable) -> dict[str, str]:
     return {name: text for name, text in found.items() if text is not None}
 
 
-def initial_dependencies(slave: Any) -> dict[int, list[int]]:
-    """For each output, the inputs and parameters on which it depends when initialisation ends, as value references."""
+def initial_dependencies(slave: Any) -> dict[int, list[int] | None]:
+    """For each output, the inputs and parameters on which it depends when initialisation ends, as value references.
+
+    None: not known, which stands for all.
+    """
     names = [v.name for v in slave.variables]
     given = [i for i, v in enumerate(slave.variables) if v.is_settable]
     known = {i: slave.initial_dependencies(v.name) for i, v in enumerate(slave.variables) if v.causality == "output"}
-    return {output: [i for i in given if names[i] in found] for output, found in known.items()}
+    return {
+        output: None if found is None else [i for i in given if names[i] in found] for output, found in known.items()
+    }
 
 
 def _simple_type(types: Element, name: str) -> Element:
@@ -190,4 +195,6 @@ def _add_structure(root: Element, slave: Any) -> None:
         SubElement(listed, "Unknown", index=str(reference + 1), dependencies="")
     initial = SubElement(structure, "InitialUnknowns")
     for reference, needed in known.items():
-        SubElement(initial, "Unknown", index=str(reference + 1), dependencies=" ".join(str(i + 1) for i in needed))
+        unknown = SubElement(initial, "Unknown", index=str(reference + 1))
+        if needed is not None:
+            unknown.set("dependencies", " ".join(str(i + 1) for i in needed))

@@ -1,12 +1,11 @@
 """The variables of the plant FMU."""
 
-import math
 from typing import Any
 
 from fmu_kit import frames
 from fmu_kit.algebra import ZERO, Quaternion
 from fmu_kit.framed import Framed
-from fmu_kit.interface import FixedParameter, Input, Local, Output, Parameter
+from fmu_kit.interface import FixedParameter, Input, Output, Parameter
 from fmu_kit.rigid_body import Body
 from plant_fmu.actuators import Box, Motors
 from plant_fmu.wind import Wind
@@ -31,7 +30,7 @@ def _motor(name: str, description: str, unit: str, start: float, **bounds: Any) 
 
 
 class PlantInterface(Framed):
-    """Inputs, outputs and parameters of the vehicle."""
+    """Inputs, parameters and motion of the vehicle; other outputs are declared in `plant_fmu.observed`."""
 
     thrust = Input(
         "total thrust, upward in the body, before limits and lag", "N", _HOVER, nominal=_HOVER, terminal="command"
@@ -112,22 +111,4 @@ class PlantInterface(Framed):
     )
     payload_drop_time = Parameter(
         "time at which the payload is let go; 0: never", "s", 0.0, name="payload.drop_time", minimum=0.0
-    )
-
-    acceleration = Local("dV/dt, inertial frame", "m/s2", ZERO, variability="continuous", frame=frames.inertial)
-    wind_force = Local(
-        "wind force, inertial frame",
-        "N",
-        ZERO,
-        name="wind.force",
-        variability="continuous",
-        nominal=_WIND.amplitude.x,
-        frame=frames.inertial,
-    )
-    tilt = Local(
-        "angle between the z axes of body and inertial frame",
-        "rad",
-        variability="continuous",
-        minimum=0.0,
-        maximum=math.pi,
     )

@@ -8,12 +8,13 @@ from fmu_kit.authors import AUTHOR, LICENSE
 from fmu_kit.errors import require, require_finite_state
 from fmu_kit.integrator import internal_steps, rk4_step
 from fmu_kit.interface import read_fields
-from fmu_kit.rigid_body import Body, RigidState, Wrench, acceleration, derivative, tilt
+from fmu_kit.rigid_body import Body, RigidState, Wrench, derivative
 from fmu_kit.saved_state import State
 from fmu_kit.scalar import FLOAT, repeat
 from fmu_kit.variables import INDEX
 from plant_fmu.actuators import Actuators, Box, Channels, Motors
 from plant_fmu.interface import PlantInterface
+from plant_fmu.observed import Observed
 from plant_fmu.payload import Payload
 from plant_fmu.wind import Wind
 
@@ -24,19 +25,23 @@ RECALL = 1.0
 _MOTION = tuple(each.name for each in PlantInterface.variables if each.causality == "output")
 
 
-class QuadrotorPlant(PlantInterface):
+class QuadrotorPlant(Observed):
     """Quadrotor as a rigid body: thrust and body torques in, motion out.
 
     With wind, actuator limits and lag.
     """
 
     author, license = AUTHOR, LICENSE
-    initial_outputs_depend_on_inputs = False
     continuous_states = ("position", "velocity", "quaternion", "angular_velocity", "_channels")
 
     @classmethod
-    def initial_dependencies(cls, output: str) -> frozenset[str]:
-        """The motion depends on its initial value; the quaternion on all of its parts, and on the axes convention."""
+    def initial_dependencies(cls, output: str) -> frozenset[str] | None:
+        """The motion depends on its initial value; the quaternion on all of its parts, and on the axes convention.
+
+        An output that is observed is not said to depend on some alone.
+        """
+        if output not in _MOTION:
+            return None
         vector, _, axis = output.rpartition(".")
         if vector == "quaternion":
             return frozenset({"frame", f"frame{INDEX}", *(f"initial.quaternion.{other}" for other in "xyzw")})
@@ -162,11 +167,8 @@ class QuadrotorPlant(PlantInterface):
         self._look(t, state.quaternion, self._channels, self._mass_at(t))
 
     def _look(self, t: float, attitude: Quaternion, channels: Channels, mass: float) -> None:
-        """Set the variables that are for looking at."""
-        wind = self._wind.force(t)
-        thrust = self._actuators.wrench(channels).thrust
-        self.acceleration = acceleration(attitude, thrust, wind + self.external_force, self._body.with_mass(mass))
-        self.wind_force, self.tilt = wind, tilt(attitude)
+        """Set what is observed."""
+        self.observe(attitude, self._actuators.wrench(channels), self._wind.force(t), self._body.with_mass(mass))
 
 
 def _unless_zero(own: float, general: float) -> float:

@@ -1,16 +1,21 @@
 """What is added has all its parts, as `docs/architecture.md` lists them under Where to add."""
 
+import importlib
+import inspect
 import re
+from typing import Any
 
 import pytest
 import typer.main
 
 from orchestration.command.cli import app
+from orchestration.components.building.models import MODELS
 from orchestration.simulation.engines.batch.folds import LANES
 from orchestration.simulation.figures.views import VIEWS
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.reductions import REDUCTIONS
 from tests.places import ROOT
+from tests.slaves import get, put
 
 PAGES = {path: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))}
 TESTS = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
@@ -21,6 +26,37 @@ FIGURES = sorted({name for view in VIEWS.values() for name in view.names})
 def words(*cells: str) -> set[str]:
     """The names in cells of a table, without their arguments."""
     return set(" ".join(re.sub(r"\(.*?\)", "", text) for cell in cells for text in re.findall("`(.*?)`", cell)).split())
+
+
+def outputs_at_first(slave: Any, names: list[str], values: dict[str, float]) -> list[float]:
+    """When initialisation ends, with these values."""
+    made = slave(instance_name="one")
+    put(made, values)
+    made.setup_experiment(0.0)
+    made.enter_initialization_mode()
+    made.exit_initialization_mode()
+    return get(made, *names)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_no_output_moves_at_first_with_what_it_is_not_declared_to_depend_on(model: str) -> None:
+    module, _, name = MODELS[model].partition(":")
+    slave = getattr(importlib.import_module(module), name)
+    outputs = [v.name for v in slave.variables if v.causality == "output" and v.type == "Real"]
+    given = {v.name: v.start for v in slave.variables if v.is_settable and v.type == "Real"}
+    start = {name: 0.01 * k for k, (name, value) in enumerate(given.items(), start=1) if value == 0.0}
+    start = {name: value for name, value in start.items() if not name.startswith(("motor.", "payload.drop", "sample_"))}
+    before = outputs_at_first(slave, outputs, start)
+    known = {output: slave.initial_dependencies(output) for output in outputs}
+    where = inspect.getsourcefile(slave.initial_dependencies), inspect.getsourcelines(slave.initial_dependencies)[1]
+    for each, value in given.items():
+        after = outputs_at_first(slave, outputs, {**start, each: 0.99 * start.get(each, value)})
+        for output in (output for output, a, b in zip(outputs, before, after) if a != b):
+            depends = known[output]
+            assert depends is None or each in depends, (
+                f"{model}.{output} moves with {each} when initialisation ends: expected {each} in what "
+                f"initial_dependencies, line {where[1]} of {where[0]}, has for {output}; or None there, for any"
+            )
 
 
 def test_every_reduction_has_its_form_in_lanes() -> None:

@@ -24,7 +24,6 @@ class CascadedController(SampledController, CascadeInterface):
     """
 
     initially_idle = SampledController.initially_idle | {
-        "angular_velocity.z",
         *(f"reference.{name}.{axis}" for name in ("jerk", "snap") for axis in "xyz"),
     }
 

@@ -449,13 +449,14 @@ STEPPED_FROM_OUTSIDE = (
 )  # fmt: skip
 
 _TILT = "self.wind_force, self.tilt = wind, tilt(attitude)"
+_WRITTEN = "self.quaternion, self.angular_velocity = state.quaternion, state.angular_velocity"
 _INITIAL_VELOCITY = "self.initial_velocity"
 _STEP = "body, wind, actuators = self._body, self._wind, self._actuators"
 
 BEHAVIOUR = (
     Mutant(
         name="output not finite", rule="finite-outputs", words=("position.x = nan",),
-        damage=source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        self.position = math.nan * self.position"),
+        damage=source("plant_fmu/observed.py", _TILT, f"{_TILT}\n        self.position = math.nan * self.position"),
         damage_3=fault("not finite"),
     ),
     Mutant(
@@ -466,13 +467,13 @@ BEHAVIOUR = (
     ),
     Mutant(
         name="runs by chance", rule="repeatable", words=("as in an equal run before",),
-        damage=source("plant_fmu/slave.py", _TILT, f'{_TILT}\n        self.tilt = __import__("random").random()'),
+        damage=source("plant_fmu/observed.py", _TILT, f'{_TILT}\n        self.tilt = __import__("random").random()'),
         damage_3=fault("by chance"),
     ),
     Mutant(
         name="state kept over reset", rule="reset", words=("without the run and reset before it",),
         damage=every(
-            source("plant_fmu/slave.py", _TILT, f"{_TILT}\n        _KEPT[self.instance_name] = self.velocity"),
+            source("plant_fmu/slave.py", _WRITTEN, f"{_WRITTEN}\n        _KEPT[self.instance_name] = self.velocity"),
             source("plant_fmu/slave.py", "_MOTION = ", "_KEPT = {}\n_MOTION = "),
             source("plant_fmu/slave.py", _INITIAL_VELOCITY, f"_KEPT.get(self.instance_name, {_INITIAL_VELOCITY})"),
         ),

@@ -164,12 +164,7 @@ def test_no_output_is_declared_to_follow_an_input_directly(description: ModelDes
     assert declared == {name: [] for name in outputs}
 
 
-IDLE = {
-    "CascadedController": {
-        "angular_velocity.z",  # the yaw command goes through a low-pass
-        *(f"reference.{derivative}.{axis}" for derivative in ("jerk", "snap") for axis in "xyz"),
-    }
-}
+IDLE = {"CascadedController": {f"reference.{derivative}.{axis}" for derivative in ("jerk", "snap") for axis in "xyz"}}
 """Inputs that a controller does not use, or not at once."""
 
 

@@ -27,8 +27,8 @@ def odd_plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sources = copy_sources(folder / "sources")
     declared = """    cargo = FixedParameter("number of boxes", None, 0)
     loaded = FixedParameter("whether they are on board", start=False)
-    acceleration = """
-    replace(sources / "plant_fmu" / "interface.py", "    acceleration = ", declared)
+    payload_mass = """
+    replace(sources / "plant_fmu" / "interface.py", "    payload_mass = ", declared)
     body = "read_fields(self, Body)"
     heavier = f"{body}.with_mass(self.mass + 0.1 * self.cargo * self.loaded)"
     replace(sources / "plant_fmu" / "slave.py", body, heavier)

@@ -91,4 +91,6 @@ def _add_structure(root: Element, slave: Any) -> None:
     for reference in known:
         SubElement(structure, "Output", valueReference=str(reference), dependencies="")
     for reference, needed in known.items():
-        SubElement(structure, "InitialUnknown", valueReference=str(reference), dependencies=" ".join(map(str, needed)))
+        unknown = SubElement(structure, "InitialUnknown", valueReference=str(reference))
+        if needed is not None:
+            unknown.set("dependencies", " ".join(map(str, needed)))

@@ -108,7 +108,7 @@ def _add_to_2(root: Element, states: Sequence[ContinuousState], added: Sequence[
         of = {} if state is None else {"derivative": positions[state.reference]}
         SubElement(scalar, variable.type, {**type_attributes(variable), **of})
         SubElement(initial, "Unknown", index=positions[reference])
-    _depend_on_themselves(outputs, "index", {positions[state.reference] for state in states})
+    _depend_on_states(outputs, "index", {positions[state.reference] for state in states})
     derivatives = Element("Derivatives")
     for state in states:
         SubElement(derivatives, "Unknown", index=positions[state.derivative_reference])
@@ -127,14 +127,16 @@ def _add_to_3(root: Element, states: Sequence[ContinuousState], added: Sequence[
         variables.insert(reference, number)
         SubElement(structure, "InitialUnknown", valueReference=str(reference))
     outputs = structure.findall("Output")
-    _depend_on_themselves(outputs, "valueReference", {str(state.reference) for state in states})
+    _depend_on_states(outputs, "valueReference", {str(state.reference) for state in states})
     for state in reversed(states):
         rate = Element("ContinuousStateDerivative", valueReference=str(state.derivative_reference))
         structure.insert(len(outputs), rate)
 
 
-def _depend_on_themselves(outputs: Iterable[Element], key: str, states: Container[str | None]) -> None:
-    """Outputs that are states depend on these, between steps on nothing else."""
+def _depend_on_states(outputs: Iterable[Element], key: str, states: Container[str | None]) -> None:
+    """Outputs that are states depend on themselves; others may depend on all states and inputs, as no list says."""
     for output in outputs:
         if output.get(key) in states:
             output.set("dependencies", output.get(key, ""))
+        else:
+            output.attrib.pop("dependencies")

@@ -143,8 +143,3 @@ ERRORS = (
     Error(name="angular velocity error", unit="rad/s", of=_output_of_controller("angular_velocity_error")),
 )
 """P̃, Ṽ, q̃ and Ω̃"""
-DRAWN = tuple(
-    f"controller.{name}"
-    for stem in ("velocity_error", "attitude_error", "angular_velocity_error")
-    for name in components(stem)
-)

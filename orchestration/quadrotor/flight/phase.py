@@ -14,12 +14,11 @@ from orchestration.simulation.figures.palette import GREY
 from orchestration.simulation.figures.style import Style
 
 ERROR, RATE = (tuple(f"controller.{c}" for c in components(name)) for name in ("position_error", "velocity_error"))
-DRAWN = (*ERROR, *RATE)
 
 
 def phase(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
     """A panel each for x, y and z, as of the samples; None if no controller has its errors as outputs."""
-    with_errors = [run for run in runs if run.has(DRAWN)]
+    with_errors = [run for run in runs if run.has((*ERROR, *RATE))]
     if not with_errors:
         return None
     columns = 3 if style.is_wide else 1

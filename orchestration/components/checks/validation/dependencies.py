@@ -1,6 +1,7 @@
 """Rules on declared dependencies: each input is moved, and the outputs that move with it are compared."""
 
 import contextlib
+import itertools
 import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator
@@ -135,11 +136,15 @@ def _moving(probe: Probe, instance: CheckedInstance, v: Variable, before: Row) -
 
 
 def _moving_far(probe: Probe, v: Variable) -> set[str]:
-    """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold."""
+    """The outputs that move in initialisation mode with a Real input that is moved far: a switch has a threshold.
+
+    Also with parameters that are zero moved a little, as are the coefficients by which it acts.
+    """
     outputs: set[str] = set()
-    for move in _FAR if v.kind == "Real" else ():
+    usual = probe.inputs_at(0)
+    zero = {p.name: around(p, usual)[1] for p in _parameters(probe) if p.kind == "Real" and start_value(p) == 0.0}
+    for values, move in itertools.product((usual, {**usual, **zero}), _FAR if v.kind == "Real" else ()):
         with probe.instance() as instance, contextlib.suppress(SimulatorError):
-            values = probe.inputs_at(0)
             instance.begin(values, probe.start)
             before = instance.row(probe.outputs)
             instance.put({v.name: float(values[v.name]) + move})
