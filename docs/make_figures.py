@@ -4,6 +4,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from docs import paper_flight, reference_figures
 from docs.pages import fill
@@ -66,13 +67,14 @@ def timing_diagram() -> Figure:
         ("delay 4 ms, delay jitter 8 ms", Timing(period=0.01, delay=0.004, delay_jitter=0.008)),
         ("jitter 6 ms, command loss 0.3", Timing(period=0.01, jitter=0.006, command_loss=0.3)),
     )
-    figure = Figure(figsize=(9.0, 6.5))
+    figure = DOCS.figure(46.0)
     for axes, (title, timing) in zip(figure.subplots(len(cases), 1, sharex=True), cases, strict=True):
         _draw_case(axes, timing)
-        axes.set_title(title, loc="left", fontsize=10)
+        axes.set_title(title, loc="left")
     axes.set_xlabel("time [ms]")
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    handles, _ = axes.get_legend_handles_labels()
+    arrow = Line2D([], [], color=GREEN, marker=">", markersize=5, label="command, until it is applied")
+    figure.legend(handles=[*handles, arrow], loc="outside lower center", ncols=4)
     return figure
 
 

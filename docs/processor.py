@@ -1,6 +1,7 @@
 """The processor time of the laws compared with their performance in the flights of the comparisons."""
 
 import csv
+import itertools
 import json
 import statistics
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +14,7 @@ from matplotlib.figure import Figure
 import quadcosim
 from orchestration.foundation.basics.documents import tables_in
 from orchestration.foundation.basics.statistics import wilson
-from orchestration.simulation.figures.palette import GREY
+from orchestration.simulation.figures.palette import GREY, MARKS
 from orchestration.simulation.figures.style import DOCS
 
 ROOT = Path(__file__).parent.parent
@@ -56,7 +57,7 @@ class Design:
     cost_of: Callable[[Sequence[float]], float]
     """the cost of a sample from the steps of the trace [s]: for a cascade at one rate, every step runs all loops"""
     color: str
-    line: str = ".-"
+    line: str = "-"
 
     @property
     def cost(self) -> float:
@@ -105,7 +106,7 @@ DESIGNS = {
         trace="cascaded",
         cost_of=max,
         color="C5",
-        line=".--",
+        line="--",
     ),
     "cascade, 4 to 2": Design(
         comparison="cascade_ratios", controller="cascade, 4 to 2", trace="cascaded", cost_of=at_ratios(4, 2), color="C7"
@@ -116,7 +117,7 @@ DESIGNS = {
         trace="cascaded",
         cost_of=at_ratios(4, 2),
         color="C7",
-        line=".--",
+        line="--",
     ),
 }
 
@@ -157,7 +158,7 @@ def figure() -> Figure:
     made = DOCS.figure(34.0)
     panels = made.subplots(1, 2, sharey=True)
     for panel, (fate, word) in zip(panels, {"settles": "settle", "survives": "survive"}.items(), strict=True):
-        for name, design in DESIGNS.items():
+        for (name, design), mark in zip(DESIGNS.items(), itertools.cycle(MARKS)):
             cells = design.cells()
             shares = [100.0 * design.cost / cell["value"] for cell in cells]
             bands = [wilson(cell[fate], cell["count"]) for cell in cells]
@@ -166,6 +167,8 @@ def figure() -> Figure:
                 shares,
                 [cell[fate] / cell["count"] for cell in cells],
                 design.line,
+                marker=mark,
+                markersize=3.5,
                 color=design.color,
                 label=name.replace("`", ""),
             )

@@ -19,7 +19,7 @@ from quadcosim import load_scenario, run
 EXAMPLES = Path(__file__).parents[1] / "examples" / "references"
 SPEED, ACCELERATION = 2.0, 1.5
 """Limits of the way-points of the example"""
-AXES = (("north", BLUE), ("east", ORANGE), ("down", GREEN))
+AXES = (("north", BLUE, "-"), ("east", ORANGE, "--"), ("down", GREEN, "-."))
 
 
 def references(style: Style) -> Figure:
@@ -28,7 +28,7 @@ def references(style: Style) -> Figure:
     halves: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.15))
     left, right = halves
     above = left.add_subplot(aspect="equal")
-    for name, color, line in (("circle", BLUE, "-"), ("lemniscate", RED, "-"), ("paper", GREEN, "--")):
+    for name, color, line in (("circle", BLUE, "-"), ("lemniscate", RED, "-."), ("paper", GREEN, "--")):
         motion = motion_values(make_signal(name, {"radius": 2.0} if name != "paper" else {}))(
             np.linspace(0.0, 43.0, 1500)
         )
@@ -41,18 +41,19 @@ def references(style: Style) -> Figure:
     t = np.linspace(0.0, curve.knots[-1], 2000)
     found = curve.at(t)
     panels: Any = right.subplots(2, 1, sharex=True)
-    for axis, (name, color) in enumerate(AXES):
-        panels[0].plot(t, found[:, 0, axis], color=color, label=name)
+    for axis, (name, color, dashes) in enumerate(AXES):
+        panels[0].plot(t, found[:, 0, axis], dashes, color=color, label=name)
     arrivals = [float(t[np.linalg.norm(found[:, 0] - point, axis=1).argmin()]) for point in points[:-1, :3]]
-    for axis, (_, color) in enumerate(AXES):
-        panels[0].plot([*arrivals, t[-1]], points[:, axis], "o", color=color, markersize=4)
+    for axis, (_, color, _) in enumerate(AXES):
+        label = None if axis else "way-points"
+        panels[0].plot([*arrivals, t[-1]], points[:, axis], "o", color=color, markersize=4, label=label)
     panels[0].set_ylabel("position [m]")
-    panels[0].legend(ncols=3, fontsize="small", loc="upper right")
+    panels[0].legend(ncols=4, fontsize="small", loc="upper right", columnspacing=1.0)
     panels[0].set_ylim(-3.0, 5.0)
     panels[1].plot(t, np.linalg.norm(found[:, 1], axis=1), color=BLUE, label="speed")
-    panels[1].plot(t, np.linalg.norm(found[:, 2], axis=1), color=RED, label="acceleration")
+    panels[1].plot(t, np.linalg.norm(found[:, 2], axis=1), "--", color=RED, label="acceleration")
     panels[1].axhline(ACCELERATION, color=RED, linestyle=":", label="its limit")
-    panels[1].set(xlabel="time [s]", ylabel="[m/s], [m/s²]", ylim=(0.0, 2.3))
+    panels[1].set(xlabel="time [s]", ylabel="speed [m/s],\nacceleration [m/s²]", ylim=(0.0, 2.3))
     panels[1].legend(ncols=3, fontsize="small", loc="upper right")
     right.align_ylabels(panels)
     return figure
@@ -63,8 +64,8 @@ def wind(style: Style) -> Figure:
     air, figure = Dryden(wind_speed=8.0, airspeed=8.0), style.figure(40.0)
     above, below = figure.subplots(2, 1)
     table = gusts(air, 20.0, np.random.default_rng(7))
-    for axis, (name, color) in enumerate(AXES):
-        above.plot(table.time, table.columns[:, axis], color=color, linewidth=0.8, label=name)
+    for axis, (name, color, dashes) in enumerate(AXES):
+        above.plot(table.time, table.columns[:, axis], dashes, color=color, linewidth=0.8, label=name)
     above.set(xlabel="time [s]", ylabel="gusts [m/s]", xlim=(0.0, 20.0), ylim=(-3.0, 4.5))
     above.legend(ncols=3, fontsize="small", loc="upper right")
     count, stretches = 4096, 60
@@ -73,12 +74,15 @@ def wind(style: Style) -> Figure:
     values = np.array(air.velocities(draws)).reshape(stretches, count, 3) * window
     power = (np.abs(np.fft.rfft(values, axis=1)) ** 2).mean(axis=0) * air.step / (math.pi * (window**2).sum())
     omega: Floats = 2.0 * math.pi * np.fft.rfftfreq(count, air.step).astype(np.float64)
-    for axis, (name, color) in enumerate(AXES):
+    for axis, (name, color, _) in enumerate(AXES):
         below.loglog(omega[2:900], power[2:900, axis], color=color, linewidth=0.7, alpha=0.7, label=f"{name}, drawn")
-        label = "formulas" if axis == 0 else None
-        below.loglog(omega[2:900], spectrum(air, axis, omega[2:900]), color=BLACK, linewidth=0.9, label=label)
+    for axis, (name, _, dashes) in enumerate(AXES):
+        below.loglog(
+            omega[2:900], spectrum(air, axis, omega[2:900]), dashes, color=BLACK, linewidth=0.9,
+            label=f"{name}, formula",
+        )  # fmt: skip
     below.set(xlabel="angular frequency [rad/s]", ylabel="spectrum [(m/s)²/(rad/s)]")
-    below.legend(ncols=4, fontsize="small", loc="lower left")
+    below.legend(ncols=2, fontsize="small", loc="lower left")
     return figure
 
 
@@ -104,7 +108,7 @@ def payload(style: Style) -> Figure:
     ):
         panel.plot(t[near], flight.signals[f"plant.{name}.z"][near], ".-", color=color, markersize=3)
         panel.axvline(5.0005, color=GREY, linestyle=":")
-        panel.set_ylabel(f"{name} down [{unit}]")
+        panel.set_ylabel(f"{name}\ndown [{unit}]")
     panels[1].set_xlabel("time [s]")
     left.align_ylabels(panels)
     whole = right.add_subplot()

@@ -59,28 +59,35 @@ def shares(
 ) -> Figure:
     """The shares that survive and settle, with Wilson intervals, two lines for each controller.
 
-    Controllers differ by colour and dashes; in a single panel their names stand on the lines.
+    Controllers differ by colour, dashes, marks and widths: of lines that coincide the lower ones are wider. In a single
+    panel their names stand on the lines.
 
     `by_title` has the cells of each panel; `colors` are those of the controllers.
     """
     several = len(by_title) > 1
     figure, panels = _panels(len(by_title), 20.0 if several else 30.0, style)
-    dashes = dict(zip(colors, itertools.cycle(DASHES)))
+    shown = {cell.controller for group in by_title.values() for cell in group}
+    names = [name for name in colors if name in shown]
+    widths = np.linspace(1.8, 1.0, len(names)) * style.line
+    looks: dict[str, dict[str, Any]] = {
+        name: {"color": colors[name], "linestyle": dashes, "marker": mark, "linewidth": width}
+        for name, dashes, mark, width in zip(names, itertools.cycle(DASHES), itertools.cycle(MARKS), widths)
+    }
     for panel, (title, group) in zip(panels, by_title.items()):
-        curves = {name: [cell for cell in group if cell.controller == name] for name in colors}
+        curves = {name: [cell for cell in group if cell.controller == name] for name in names}
         for name, those in curves.items():
-            _shares_of(panel, axis, those, color=colors[name], dashes=dashes[name])
+            _shares_of(panel, axis, those, looks[name])
         runs = max((cell.count for cell in group), default=0)
         panel.set_title(title if several else _joined(title, f"{runs} starts, 95 % intervals"))
         panel.set_ylim(-0.02, 1.02)
         if not several:
             _name_curves(panel, axis, curves, colors, style)
-    shown = {cell.controller for group in by_title.values() for cell in group}
-    names = [name for name in colors if name in shown and several]
-    handles = [Line2D([], [], color=colors[name], linestyle=dashes[name], label=name) for name in names]
-    handles += [Line2D([], [], color=GREY, label=fate, **how) for fate, how in _LINES.items()]
+    handles = [Line2D([], [], label=name, **{**looks[name], "markersize": _SIZE}) for name in names if several]
+    handles += [Line2D([], [], color=GREY, marker="o", label=fate, **how) for fate, how in _LINES.items()]
     if several:
-        figure.legend(handles=handles, loc="outside right center")
+        (figure.axes[len(by_title)] if len(figure.axes) > len(by_title) else figure).legend(
+            handles=handles, loc="center" if len(figure.axes) > len(by_title) else "outside right center"
+        )
         figure.supxlabel(axis.title)
         figure.supylabel("share of the starts [1]")
     else:
@@ -137,8 +144,8 @@ def fronts_of(
 ) -> Figure:
     """Error against effort at values of the axis; the line joins the Pareto front.
 
-    Each panel has its own axes. A point far beyond the others is told in words; controllers that survive too few of the
-    starts at one of the values are counted in its title.
+    Each panel has its own axes. Points far from the median are counted and told in words; controllers that survive too
+    few of the starts at one of the values are counted in its title.
 
     `metrics` are the labels of effort and error, `colors` those of the controllers.
     """
@@ -147,7 +154,7 @@ def fronts_of(
     shown = {point.controller for point in points}
     for panel, value in zip(panels, values):
         here = [point for point in points if point.value == value]
-        near = [point for point in here if not _is_far(point, here)]
+        near = _near(here)
         for point in near:
             effort, error = _sides(point.effort), _sides(point.error)
             panel.errorbar(
@@ -157,15 +164,13 @@ def fronts_of(
             )  # fmt: skip
         line = sorted((p.effort.value or 0.0, p.error.value or 0.0) for p in near if p.on_front)
         panel.plot(*np.transpose(line), color=GREY, linewidth=0.8, zorder=0)
-        beyond = [f"{p.controller}: {p.effort.value:,.3g}, {p.error.value:.2g}" for p in here if p not in near]
-        if beyond:
-            panel.text(
-                0.98, 0.98, "\n".join(["beyond these axes", *beyond]), transform=panel.transAxes, ha="right", va="top",
-                fontsize="small",
-            )  # fmt: skip
         left_out = f" of {len(shown)}" if len(here) < len(shown) else ""
         panel.set_title(f"{axis.text_of(float(value))}, {here[0].starts} starts,\n{len(here)}{left_out} controllers")
         panel.set(xscale="log", yscale="log")
+        beyond = [point for point in here if point not in near]
+        if beyond:
+            places = [f"{p.controller},\nat {_digits(p.effort.value)}, {_digits(p.error.value)}" for p in beyond]
+            _tell(panel, "\n".join([f"{len(beyond)} of {len(here)} beyond these axes:", *places]))
         plain(panel.xaxis)
         plain(panel.yaxis)
     handles = [Line2D([], [], linestyle="", marker=marks[n], color=c, label=n) for n, c in colors.items() if n in shown]
@@ -186,17 +191,30 @@ def _joined(title: str, text: str) -> str:
     return f"{title}; {text}" if title else text
 
 
-FAR = 20.0
-"""Ratio to the median of a panel beyond which a point is told in words"""
+FENCE, ROOM = 6.0, 20.0
+"""Distance from the median beyond which a point is outside: in medians of that distance, and at least as a ratio"""
 
 
-def _is_far(point: Point, here: Sequence[Point]) -> bool:
-    """Whether error or effort of a point would flatten those of the others."""
-    for side in ("error", "effort"):
-        values = [getattr(one, side).value for one in here]
-        if getattr(point, side).value > FAR * float(np.median(values)) and len(here) > 2:
-            return True
-    return False
+def _near(points: Sequence[Point]) -> list[Point]:
+    """The points that do not flatten the others: neither effort nor error is far from the median."""
+    sides = np.log([[max(one.value or 0.0, 1e-300) for one in (p.effort, p.error)] for p in points])
+    distance = np.abs(sides - np.median(sides, axis=0))
+    inside = (distance <= np.maximum(FENCE * np.median(distance, axis=0), np.log(ROOM))).all(axis=1)
+    return [point for point, is_inside in zip(points, inside) if is_inside]
+
+
+def _digits(value: float | None) -> str:
+    """Two digits, never as a power of ten."""
+    rounded = float(f"{value or 0.0:.2g}")
+    return f"{rounded:,.0f}" if abs(rounded) >= 10.0 else f"{rounded:g}"
+
+
+def _tell(panel: Axes, text: str) -> None:
+    """Lines of text in the upper right, above all points of logarithmic axes."""
+    share = 0.06 * (text.count("\n") + 2)
+    low, high = np.log(panel.get_ylim())
+    panel.set_ylim(top=math.exp(low + (high - low) / (1.0 - share)))
+    panel.text(0.98, 0.98, text, transform=panel.transAxes, ha="right", va="top", fontsize="small")
 
 
 def colors_of(names: Sequence[str]) -> dict[str, str]:
@@ -207,41 +225,53 @@ def colors_of(names: Sequence[str]) -> dict[str, str]:
     return {name: matplotlib.colors.to_hex(shade) for name, shade in zip(names, shades)}
 
 
+_SIZE = 3.5
+"""Size of the marks of shares [pt]"""
 _LINES: Mapping[str, Mapping[str, Any]] = {
-    "survive": {"marker": "."},
-    "settle": {"marker": "o", "markerfacecolor": "white", "markersize": 3.5, "linewidth": 0.7},
+    "survive": {"markersize": _SIZE},
+    "settle": {"markersize": _SIZE, "markerfacecolor": "white", "linewidth": 0.7},
 }
-"""Styles of the two lines of a controller"""
+"""What the two lines of a controller differ in"""
 
 
-def _shares_of(panel: Axes, axis: Quantity, group: Sequence[CellSummary], *, color: str, dashes: str) -> None:
+def _shares_of(panel: Axes, axis: Quantity, group: Sequence[CellSummary], look: Mapping[str, Any]) -> None:
     """The two lines of one controller."""
     at = axis.of([cell.value for cell in group])
     for fate, line in (("settle", [cell.settles for cell in group]), ("survive", [cell.survives for cell in group])):
-        panel.plot(at, [share.value for share in line], color=color, linestyle=dashes, **_LINES[fate])
-        panel.fill_between(
-            at, [share.low for share in line], [share.high for share in line], color=color, alpha=0.08, linewidth=0.0
-        )
+        panel.plot(at, [share.value for share in line], **{**look, **_LINES[fate]})
+        low, high = [share.low for share in line], [share.high for share in line]
+        panel.fill_between(at, low, high, color=look["color"], alpha=0.08, linewidth=0.0)
+
+
+STEP = 0.05
+"""Height of a name on the axis of shares"""
 
 
 def _name_curves(
     panel: Axes, axis: Quantity, curves: Mapping[str, Sequence[CellSummary]], colors: Mapping[str, str], style: Style
 ) -> None:
-    """Names on the lines of survival at different heights: the earlier a line falls, the lower its name."""
+    """Names on the lines of survival at different heights: the earlier a line falls, the lower its name.
+
+    Names of lines that do not fall stand at their ends; near 1, where lines coincide, one above the other.
+    """
     known = {name: group for name, group in curves.items() if group}
     order = sorted(known, key=lambda name: sum(cell.survives.value for cell in known[name]))
+    top = 1.0 + 0.7 * STEP
     for name, height in zip(order, np.linspace(0.1, 0.9, 2 * len(order) + 1)[1::2]):
         at, share = axis.of([cell.value for cell in known[name]]), [cell.survives.value for cell in known[name]]
         below = next((k for k in range(1, len(share)) if share[k] < height <= share[k - 1]), None)
-        place = (
-            (at[-1], share[-1])
-            if below is None
-            else (float(np.interp(height, (share[below], share[below - 1]), (at[below], at[below - 1]))), height)
-        )
+        if below is not None:
+            place = (float(np.interp(height, (share[below], share[below - 1]), (at[below], at[below - 1]))), height)
+        elif share[-1] > 1.0 - 1.5 * STEP:
+            place, top = (at[-1], top), top + STEP
+        else:
+            place = (at[-1], share[-1] + 0.7 * STEP)
         panel.annotate(
             name, place, color=colors[name], fontsize=0.85 * style.font, ha="center" if below else "right", va="center",
             path_effects=[withStroke(linewidth=0.35 * style.font, foreground="white")],
         )  # fmt: skip
+    panel.set_ylim(top=max(1.02, top))
+    panel.set_yticks(np.linspace(0.0, 1.0, 6))
 
 
 def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, color: str, label: str | None) -> None:
@@ -268,11 +298,12 @@ def _panels(
 ) -> tuple[Figure, "np.ndarray[tuple[int], np.dtype[np.object_]]"]:
     """A figure with `count` panels, each `height` lines high, at most three in a row, with shared axes."""
     columns = min(3 if style.is_wide else 1, count)
+    columns = 2 if count == 4 and columns == 3 else columns  # no row with a single panel
     rows = math.ceil(count / columns)
     figure = style.figure(height * rows + 6.0)
     panels = figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False).ravel()
     for panel in panels[count:]:
-        panel.set_visible(False)
+        panel.set_axis_off()  # a legend may stand there
     for panel in panels[max(count - columns, 0) : count]:
         panel.xaxis.set_tick_params(labelbottom=True)  # also without a panel below it
     return figure, panels[:count]

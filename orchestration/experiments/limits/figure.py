@@ -166,13 +166,13 @@ def spectral_radius(result: Limit, values: Floats, radii: Floats, style: Style =
     across = quantities.setting(result.of, values)
     panel.plot(across.of(values), radii, color=BLUE)
     panel.axhline(1.0, color=GREY, linewidth=0.8)
-    for limit, color, name in (
-        (result.local_limit, BLUE, "local"),
-        (result.large_signal_limit, ORANGE, "large-signal"),
+    for limit, color, dashes, name in (
+        (result.local_limit, ORANGE, "--", "local limit, by theory"),
+        (result.large_signal_limit, RED, "-", "measured limit"),
     ):
         if limit is not None:
             at = across.factor * limit
-            panel.axvline(at, color=color, linestyle="--", label=f"{name} limit, {across.text_of(limit, DIGITS)}")
+            panel.axvline(at, color=color, linestyle=dashes, label=f"{name}  {across.text_of(limit, DIGITS)}")
     panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
     panel.margins(x=0)
     if panel.get_legend_handles_labels()[0]:

@@ -18,7 +18,7 @@ def quantity_of(axis: Axis, units: Mapping[str, str]) -> Quantity:
     """The quantity of an axis, with its display name and its unit in the store; a factor has no unit."""
     unit = None
     if axis.targets and not axis.multiplies:
-        known = {unit_known(target) for target in axis.targets}
+        known = {unit for target in axis.targets if (unit := unit_known(target)) is not None}  # all have one value
         unit = units.get(axis.name) or (known.pop() if len(known) == 1 else None)
     return quantity(name_of(axis), unit, (axis.low, axis.high) if axis.values is None else axis.values)
 

@@ -73,6 +73,7 @@ def lines(
             edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(units.get(metric))}"
         )
     _mark_diverged(panel, {color: at for color, at in diverged.items() if len(at)})
+    plain(panel.xaxis)
     plain(panel.yaxis)
     handles, names = panel.get_legend_handles_labels()
     figure.legend(handles, names, title=None if len(axes) == 1 else second.title, loc="outside right upper")
@@ -115,6 +116,7 @@ def scatter(
         panel.plot(down, np.full(len(down), 0.98), "^", color=RED, markersize=3, transform=panel.get_xaxis_transform())
         panel.set(xlabel=across.title, yscale=_scale(table[metric]))
         panel.set_xscale(SCALES[axis.scale])
+        plain(panel.xaxis)
         plain(panel.yaxis)
     for panel in panels[len(axes) :]:
         panel.set_visible(False)
@@ -183,8 +185,15 @@ def by_horizon(table: "pd.DataFrame") -> str:
     return f", by {horizons.pop():g} s" if len(horizons) == 1 else ""
 
 
+SPIKE = 10.0
+"""Ratio of the largest of positive values to their median above which their axis is logarithmic: it flattens them"""
+
+
 def _scale(values: "pd.Series") -> str:
-    return "log" if is_wide(values.to_numpy(float, na_value=np.nan)) else "linear"
+    known = values.to_numpy(float, na_value=np.nan)
+    known = known[np.isfinite(known)]
+    spikes = len(known) > 0 and known.min() > 0.0 and known.max() > SPIKE * float(np.median(known))
+    return "log" if spikes or is_wide(known) else "linear"
 
 
 _KINDS = {

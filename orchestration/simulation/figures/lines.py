@@ -105,7 +105,8 @@ def wrapped(label: str, width: int = 24) -> str:
 def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
     """Clip short peaks that would hide the rest of the signals, and show them in an inset with a note.
 
-    `lines` are those drawn on `axes`, with all rows; returns whether anything was clipped.
+    `lines` are those drawn on `axes`, with all rows; returns whether anything was clipped: not where peaks are spread
+    over the run, as an inset of all of it would show no more than the axes.
     """
     inner = [_without_peaks(t, y) for t, y in lines if len(t) > 1 and np.isfinite(y).any()]
     if not inner:
@@ -115,10 +116,17 @@ def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
     if high <= low or top - bottom <= CLIPPED * (high - low):
         return False
     room = 0.25 * (high - low)
+    outside = np.concatenate([t[(y < low - room) | (y > high + room)] for t, y in lines])
+    if np.ptp(outside) > SPREAD * (axes.get_xlim()[1] - axes.get_xlim()[0]):
+        return False
     seen = (max(bottom, low - room) if bottom >= low - room else low - room, min(top, high + room))
     axes.set_ylim(seen[0] - 0.05 * (seen[1] - seen[0]), seen[1] + 0.9 * (seen[1] - seen[0]))
-    _inset(axes, lines, (low - room, high + room), unit, style)
+    _inset(axes, lines, outside, unit, style)
     return True
+
+
+SPREAD = 0.3
+"""Share of the axis over which peaks are spread too far for an inset"""
 
 
 def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
@@ -130,9 +138,8 @@ def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
     return float(values[order[min(low, len(order) - 1)]]), float(values[order[min(high, len(order) - 1)]])
 
 
-def _inset(axes: Axes, lines: Lines, seen: tuple[float, float], unit: str, style: Style) -> None:
-    """The time span of the peaks in the upper right; the title states the largest."""
-    outside = np.concatenate([t[(y < seen[0]) | (y > seen[1])] for t, y in lines])
+def _inset(axes: Axes, lines: Lines, outside: Floats, unit: str, style: Style) -> None:
+    """The time span of the peaks, whose times are `outside`, in the upper right; the title states the largest."""
     t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
     k = int(np.nanargmax(np.abs(y)))
     span = axes.get_xlim()[1] - axes.get_xlim()[0]

@@ -1,17 +1,19 @@
 """The agreement chart: the difference of each tool to this project's master, by kind of signal."""
 
 import itertools
+import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, INDIGO, ORANGE, RED
-from orchestration.simulation.figures.style import SCREEN, save
+from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.interop.compare import Agreement
 from orchestration.simulation.interop.table import TOLERANCE
 from orchestration.systems.system.connection import component_of
 
+AIM = f"aim, $10^{{{math.log10(TOLERANCE):g}}}$"
 ZERO_DRAWN_AT = 1e-17
 """Place at which a difference of zero is drawn"""
 
@@ -32,9 +34,9 @@ def draw(agreements: Sequence[Agreement], folder: Path) -> list[Path]:
     return save({"interop": chart}, folder)
 
 
-def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
+def agreement_chart(agreements: Sequence[Agreement], style: Style = SCREEN) -> Figure:
     """A row for each tool; open: as it comes; filled: with the tool's first inputs in this master, too."""
-    figure = Figure(figsize=(9.0, 1.6 + 0.42 * len(agreements)))
+    figure = style.figure(10.0 + 3.0 * len(agreements))
     panel = figure.add_subplot()
     kinds = _kinds({signal for agreement in agreements for signal in agreement.as_it_comes})
     for row, agreement in enumerate(agreements):
@@ -48,14 +50,14 @@ def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
                         markerfacecolor=color if filled else "none", linestyle="none",
                         label=name if filled else None,
                     )  # fmt: skip
-    panel.axvline(TOLERANCE, color=GREY, linestyle="--", linewidth=1.0, label=f"aim, {TOLERANCE:g}")
+    panel.axvline(TOLERANCE, color=GREY, linestyle="--", linewidth=1.0, label=AIM)
     panel.set(xscale="log", xlabel="largest difference from quadcosim's master [SI units]")
     panel.set_yticks(range(len(agreements)), [agreement.tool.name for agreement in agreements])
     panel.invert_yaxis()
-    panel.set_title("open: as the tool comes; filled: with the tool's inputs of the first step in both", fontsize=9)
+    figure.suptitle(style.lines_of("open: as the tool comes; filled: with the tool's inputs of the first step in both"))
     lines = {line.get_label(): line for line in reversed(panel.get_legend_handles_labels()[0])}
-    names = [name for name in (*kinds, f"aim, {TOLERANCE:g}") if name in lines]
-    figure.legend([lines[name] for name in names], names, loc="outside right upper", fontsize=8)
+    names = [name for name in (*kinds, AIM) if name in lines]
+    figure.legend([lines[name] for name in names], names, loc="outside right upper")
     return figure
 
 

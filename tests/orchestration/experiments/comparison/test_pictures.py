@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import CellSummary, Median, Share
@@ -11,7 +12,7 @@ from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.results.quantities import Quantity
 
-SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20)}
+SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20), "nor this": (20, 20, 20)}
 
 
 def cells_of(controller: str, survivors: Sequence[int]) -> list[CellSummary]:
@@ -34,10 +35,11 @@ def test_controllers_differ_by_dashes_and_are_named_on_their_lines_the_earlier_t
     (panel,) = drawn("one").axes
     assert len({line.get_linestyle() for line in panel.get_lines()}) == len(SURVIVORS)
     places = {text.get_text(): text.xy for text in panel.texts}  # type: ignore[attr-defined]
-    assert list(places) == ["soon", "later", "never"]
+    assert list(places) == ["soon", "later", "never", "nor this"]
     assert 0.0 < places["soon"][1] < places["later"][1] < 1.0
     assert 0.0 < places["soon"][0] < 1.0 < places["later"][0] < 2.0
-    assert places["never"] == (2.0, 1.0)
+    assert (places["never"][0], places["nor this"][0]) == (2.0, 2.0)
+    assert 1.0 < places["never"][1] < places["nor this"][1] < panel.get_ylim()[1], "lines that coincide have two names"
 
 
 def test_several_panels_have_their_controllers_in_one_legend() -> None:
@@ -77,8 +79,11 @@ def test_a_point_far_beyond_the_others_is_told_in_words_and_those_left_out_are_c
     figure = fronts_of(points, (0.01, 0.02), Quantity(name="period", unit="s"), ("effort", "error"), colors, "body")
     calm, wild = figure.axes
     assert not calm.texts
-    assert [text.get_text() for text in wild.texts] == ["beyond these axes\nwild: 1.2e+06, 5.7"]
+    assert [text.get_text() for text in wild.texts] == ["1 of 3 beyond these axes:\nwild,\nat 1,200,000, 5.7"]
     assert max(wild.get_ylim()) < 1.0
+    assert max(float(np.max(np.asarray(line.get_ydata()))) for line in wild.get_lines()) < 0.75 * max(
+        wild.get_ylim()
+    ), "room for the words"
     assert calm.get_title().endswith("9 starts,\n3 of 4 controllers")
     assert "2 of 3 values" in figure.get_suptitle()
 

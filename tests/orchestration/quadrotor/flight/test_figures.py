@@ -261,7 +261,8 @@ def test_errors_that_are_flat_for_four_fifths_are_cut_there_unless_a_window_is_g
 def test_a_clipped_peak_is_noted_and_shown_in_an_inset(flight: Result) -> None:
     t = np.linspace(0.0, 10.0, 2001)
     peaked, calm = 0.5 * np.sin(t) - 100.0 * np.exp(-20.0 * t), np.sin(t) + 1.0
-    for values, clips in ((peaked, True), (calm, False)):
+    noisy = 0.5 * np.sin(t) - 100.0 * (np.arange(len(t)) % 200 == 100)  # an inset would have the whole time
+    for values, clips in ((peaked, True), (calm, False), (noisy, False)):
         axes = Figure().add_subplot()
         axes.plot(t, values)
         axes.set_xlim(0.0, 10.0)
