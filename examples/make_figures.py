@@ -23,8 +23,8 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.loops import Loops
 
 HERE = Path(__file__).resolve().parent
-SMALL = (7.0, 3.2)
-"""Size of a small figure [inch]"""
+SMALL = 26.0
+"""Height of a small figure in lines of text"""
 
 
 def simulate(name: str, **changes: Any) -> Result:
@@ -45,80 +45,96 @@ def held(axes: Axes, result: Result, signal: str, color: str, label: str) -> Non
 
 def water_tank() -> Figure:
     """The level with a prompt and with late valves, and the bound."""
-    figure = Figure(figsize=SMALL)
+    figure = DOCS.figure(SMALL)
     axes = figure.subplots()
-    for delay, color in ((0.0, GREEN), (0.25, BLUE), (0.6, ORANGE)):
+    for delay, color, dashes in ((0.0, GREEN, "-"), (0.25, BLUE, "--"), (0.6, ORANGE, "-.")):
         result = simulate("water_tank", stop_time=10.0, connections__valve__delay=delay)
-        line(axes, result, "tank.level", color, f"valve {delay:g} s late: peak {result.metrics['peak']:.2f} m")
+        label = f"valve {delay:g} s late: peak {result.metrics['peak']:.2f} m"
+        line(axes, result, "tank.level", color, label, linestyle=dashes)
         axes.axhline(2.0 + 0.1 + delay, color=color, linestyle=":", linewidth=1.0)
     axes.axhspan(1.0, 2.0, color=GREY, alpha=0.12, label="where the valve is left as it is")
-    axes.set(xlabel="time [s]", ylabel="level [m]", title="dotted: 2 m + (0.1 s + delay) · 1 m/s", ylim=(0.0, 3.9))
-    axes.legend(loc="upper left", ncols=2, fontsize=8)
+    axes.set(
+        xlabel="time [s]", ylabel="level [m]", title="dotted: the bound, 2 m + (0.1 s + delay) · 1 m/s", ylim=(0.0, 3.9)
+    )
+    axes.legend(loc="upper left", ncols=2)
     return figure
 
 
 def double_integrator() -> Figure:
     """The position at periods on both sides of the limit."""
-    figure = Figure(figsize=SMALL)
+    figure = DOCS.figure(SMALL)
     axes = figure.subplots()
-    for period, color in ((0.5, GREEN), (1.8, BLUE), (2.1, RED)):
+    for period, color, dashes in ((0.5, GREEN, "-"), (1.8, BLUE, "--"), (2.1, RED, "-.")):
         result = simulate("double_integrator", stop_time=25.0, components__controller__sampling__period=period)
-        line(axes, result, "plant.x", color, f"period {period:g} s")
-    axes.set(xlabel="time [s]", ylabel="x [m]", ylim=(-8.0, 8.0), title="by theory it dies out below a period of 2 s")
+        line(axes, result, "plant.x", color, f"period {period:g} s", linestyle=dashes)
+    axes.set(
+        xlabel="time [s]", ylabel="position [m]", ylim=(-8.0, 8.0), title="by theory it dies out below a period of 2 s"
+    )
     axes.legend(loc="lower left", ncols=3, frameon=True, framealpha=0.9)
     return figure
 
 
 def dc_servo() -> Figure:
     """The angle over wires of different quality."""
-    figure = Figure(figsize=SMALL)
+    figure = DOCS.figure(SMALL)
     axes = figure.subplots()
     wires = (
-        ("2 ms late", 0.002, 0.0, 0.0, GREEN),
-        ("and up to 4 ms more, a tenth lost", 0.002, 0.004, 0.1, BLUE),
-        ("12 ms late", 0.012, 0.0, 0.0, ORANGE),
-        ("and up to 4 ms more, a tenth lost", 0.012, 0.004, 0.1, RED),
+        ("2 ms late", 0.002, 0.0, 0.0, GREEN, "-"),
+        ("2 to 6 ms late, a tenth lost", 0.002, 0.004, 0.1, BLUE, "--"),
+        ("12 ms late", 0.012, 0.0, 0.0, ORANGE, "-."),
+        ("12 to 16 ms late, a tenth lost", 0.012, 0.004, 0.1, RED, ":"),
     )
-    for label, delay, jitter, loss, color in wires:
+    for label, delay, jitter, loss, color, dashes in wires:
         result = simulate(
             "dc_servo", stop_time=0.6, connections__command__delay=delay,
             connections__command__delay_jitter=jitter, connections__command__loss=loss,
         )  # fmt: skip
-        line(axes, result, "servo.angle", color, label)
-    axes.set(xlabel="time [s]", ylabel="angle [rad]", ylim=(-2.5, 2.5), title="seed 0; sampled every 6 ms")
-    axes.legend(loc="upper right", ncols=2, fontsize=8)
+        line(axes, result, "servo.angle", color, label, linestyle=dashes)
+    axes.set(xlabel="time [s]", ylabel="angle [rad]", ylim=(-1.6, 2.1), title="seed 0; sampled every 6 ms")
+    axes.legend(loc="upper right", ncols=2)
     return figure
 
 
 def minimum_variance() -> Figure:
     """Cost over gain: theory, and eight runs at each of some gains."""
-    figure = Figure(figsize=SMALL)
+    figure = DOCS.figure(SMALL)
     axes = figure.subplots()
     gains = np.linspace(0.3, 1.8, 200)
     variance = 1.0 / (2.0 * gains - gains**2)
     axes.plot(gains, variance * (1.0 - gains + gains**2 / 3.0) + 0.5, color=BLUE, label="x², theory")
-    axes.plot(gains, variance * (1.0 - gains + 4.0 * gains**2 / 3.0) + 0.5, color=ORANGE, label="x² + u², theory")
+    axes.plot(
+        gains,
+        variance * (1.0 - gains + 4.0 * gains**2 / 3.0) + 0.5,
+        color=ORANGE,
+        linestyle="--",
+        label="x² + u², theory",
+    )
     for gain in (0.4, 0.65, 3.0 - math.sqrt(3.0), 1.6):
         runs = [simulate("minimum_variance", seed=s, components__controller__parameters__gain=gain) for s in range(8)]
         variances, efforts = (np.array([r.metrics[name] for r in runs], float) for name in ("variance", "effort"))
         for costs, color in ((variances, BLUE), (variances + efforts, ORANGE)):
             axes.plot([gain] * len(costs), costs, ".", color=color, markersize=4)
     axes.plot([], [], ".", color=GREY, label="runs of 2000 s")
-    axes.set(xlabel="gain [1/s]", ylabel="per unit time", ylim=(0.5, 4.0), title="least of x²: (3 + √3)/6 at 3 - √3")
+    axes.set(
+        xlabel="gain [1/s]",
+        ylabel="cost, per unit time",
+        ylim=(0.5, 4.0),
+        title="least of x²: (3 + √3)/6 at a gain of 3 − √3",
+    )
     axes.legend(loc="upper left")
     return figure
 
 
 def four_components() -> Figure:
     """Speed and forces over time."""
-    figure = Figure(figsize=(7.0, 5.0))
+    figure = DOCS.figure(38.0)
     speeds, forces = figure.subplots(2, 1, sharex=True)
     result = simulate("four_components")
     speeds.axhline(25.0, color=GREY, linestyle=":", label="set speed")
     held(speeds, result, "sensor.filtered", ORANGE, "sensor, every 10 ms")
-    line(speeds, result, "car.speed", BLUE, "car")
+    line(speeds, result, "car.speed", BLUE, "car", linestyle="--")
     held(forces, result, "controller.force", GREEN, "asked by the controller, every 100 ms")
-    held(forces, result, "engine.force", RED, "engine, every 20 ms")
+    line(forces, result, "engine.force", RED, "engine, every 20 ms", drawstyle="steps-post", linestyle="--")
     speeds.set(ylabel="speed [m/s]", title="uphill from 20 s on; demands up to 80 ms late, a tenth of them lost")
     forces.set(xlabel="time [s]", ylabel="force [N]")
     speeds.legend(loc="lower right")
@@ -128,15 +144,16 @@ def four_components() -> Figure:
 
 def three_servos() -> Figure:
     """The angles, with the processor scheduled by rates and by deadlines."""
-    figure = Figure(figsize=SMALL)
+    figure = DOCS.figure(SMALL)
     both = figure.subplots(1, 2, sharey=True)
     for axes, how in zip(both, ("fixed-priority", "earliest-deadline-first")):
         result = simulate("three_servos", stop_time=0.6, computers__node__scheduling=how)
-        for name, period, color in (("slow", 6, RED), ("middle", 5, BLUE), ("fast", 4, GREEN)):
-            line(axes, result, f"{name}_servo.angle", color, f"every {period} ms")
+        looks = (("slow", 6, RED, "-"), ("middle", 5, BLUE, "--"), ("fast", 4, GREEN, ":"))
+        for name, period, color, dashes in looks:
+            line(axes, result, f"{name}_servo.angle", color, f"every {period} ms", linestyle=dashes)
         axes.set(xlabel="time [s]", ylim=(-3.0, 3.0), title=how.replace("-", " "))
     both[0].set(ylabel="angle [rad]")
-    both[1].legend(loc="upper right", fontsize=8)
+    both[1].legend(loc="upper right")
     return figure
 
 
@@ -158,7 +175,7 @@ def distributed_servo() -> Figure:
             found = loops.solve(changed(varied, {"connections.command.delay": delay}))
             radius[i, j] = found.loop.result.radius
             cost[i, j] = sum(found.means.values()) if found.means is not None else NO_END
-    figure = Figure(figsize=(7.0, 4.2))
+    figure = DOCS.figure(34.0)
     axes = figure.subplots()
     levels = [40.0, 50.0, 65.0, 80.0, 100.0, 150.0, 250.0, 500.0, 1000.0]
     shades = axes.contourf(1e3 * periods, 1e3 * delays, cost, levels, norm=LogNorm(), cmap="viridis", extend="both")
@@ -169,8 +186,8 @@ def distributed_servo() -> Figure:
         np.full(3, 6.0), known, "o", color="white", markeredgecolor="black", clip_on=False,
         label="known: 65.5, 86.2, 123.0",
     )  # fmt: skip
-    figure.colorbar(shades, label="J = mean of y² + u²", ticks=levels, format="%g")
-    axes.set(xlabel="period [ms]", ylabel="delay [ms]", title="beyond the red line there is no finite expectation")
+    figure.colorbar(shades, label="J, mean of y² + u² [1]", ticks=levels, format="%g")
+    axes.set(xlabel="period [ms]", ylabel="delay [ms]", title="beyond the line the expectation is not finite")
     axes.legend(loc="lower right", frameon=True, framealpha=0.9)
     return figure
 

@@ -12,9 +12,10 @@ import control
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 import quadcosim
-from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, ORANGE
+from orchestration.simulation.figures.palette import BLUE, DASHES, GREEN, GREY, ORANGE
 from orchestration.simulation.figures.style import DOCS, save
 from orchestration.systems.system.component import Parameter
 from quadcosim import FmuChoice, Linearised, Scenario, StateSpace, Timing
@@ -163,18 +164,21 @@ def margins(loop: Linearised, command: str) -> tuple[float, float]:
 
 def bode(sets: Mapping[str, Gains]) -> Figure:
     """The Bode plot of the loop of the torque about y, which includes the position."""
-    figure = Figure(figsize=(7.0, 5.0))
+    figure = DOCS.figure(38.0)
     sizes, phases = figure.subplots(2, 1, sharex=True)
-    for (name, gains), color in zip(sets.items(), (GREY, BLUE, GREEN, ORANGE)):
+    for (name, gains), color, dashes in zip(sets.items(), (GREY, BLUE, GREEN, ORANGE), DASHES):
         loop = loop_of(gains)
         found, (margin, crossover) = broken_at(loop, "torque.y"), margins(loop, "torque.y")
         label = f"{name.upper()}: {margin:.0f}° at {crossover:.1f} rad/s"
-        sizes.loglog(FREQUENCIES, found.magnitude.ravel(), color=color, label=label)
-        phases.semilogx(FREQUENCIES, np.degrees(np.unwrap(found.phase.ravel())) - 360.0, color=color)
+        sizes.loglog(FREQUENCIES, found.magnitude.ravel(), dashes, color=color, label=label)
+        phases.semilogx(FREQUENCIES, np.degrees(np.unwrap(found.phase.ravel())) - 360.0, dashes, color=color)
     sizes.axhline(1.0, color=GREY, linewidth=0.8)
     phases.axhline(-180.0, color=GREY, linewidth=0.8)
-    sizes.set(ylabel="size of the loop", title=f"the torque about y, sampled every {1000 * PERIOD:g} ms")
-    phases.set(xlabel="frequency [rad/s]", ylabel="phase [degrees]")
+    sizes.set(
+        ylabel="loop gain |L| [1]", title=f"the torque about y, sampled every {1000 * PERIOD:g} ms: phase margins"
+    )
+    phases.set(xlabel="frequency [rad/s]", ylabel="phase of L [°]")
+    phases.yaxis.set_major_locator(MultipleLocator(90.0))
     sizes.legend(loc="lower left")
     return figure
 

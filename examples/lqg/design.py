@@ -102,22 +102,22 @@ def at(delay: float, *, gain_knows: bool, filter_knows: bool) -> System:
 
 def over_delays() -> Figure:
     """The exact cost over the delay of the command, by design, compared with runs."""
-    figure = Figure(figsize=(7.0, 3.2))
+    figure = DOCS.figure(26.0)
     axes = figure.subplots()
     delays = np.linspace(0.0, PERIOD, 41)
     loops = Loops(files_of(at(0.0, gain_knows=True, filter_knows=True)).models)
-    for label, color, gain_knows, filter_knows in (
-        ("neither filter nor gain knows of the delay", RED, False, False),
-        ("the filter does", ORANGE, False, True),
-        ("both do: LQG", BLUE, True, True),
+    for label, color, dashes, gain_knows, filter_knows in (
+        ("neither filter nor gain knows of the delay", RED, "-", False, False),
+        ("the filter does", ORANGE, "--", False, True),
+        ("both do: LQG", BLUE, "-.", True, True),
     ):
         system = functools.partial(at, gain_knows=gain_knows, filter_knows=filter_knows)
         costs = np.array([expected_of(system(d), loops).objectives["J"] for d in delays.tolist()], float)
-        axes.plot(1e3 * delays, 1e4 * costs, color=color, label=label)
+        axes.plot(1e3 * delays, 1e4 * costs, dashes, color=color, label=label)
         for late in RUNS:
             runs = [quadcosim.run(dataclasses.replace(system(late), seed=seed)).metrics["J"] for seed in range(4)]
             axes.plot([1e3 * late] * len(runs), 1e4 * np.array(runs, float), ".", color=color, markersize=4)
-    axes.set(xlabel="delay of the command [ms]", ylabel="J [1e-4 rad²]", ylim=(0.0, 50.0))
+    axes.set(xlabel="delay of the command [ms]", ylabel="cost J [10⁻⁴ rad²]", ylim=(0.0, 50.0))
     axes.set_title("lines: exact; dots: runs of 300 s")
     axes.legend(loc="upper left")
     return figure

@@ -130,9 +130,9 @@ def test_there_is_a_row_for_each_tool_from_the_top() -> None:
 
 def test_the_legend_names_what_any_tool_has_and_the_aim() -> None:
     for found, names in (
-        (SEVERAL, ["position", "velocity", "quaternion", "angular velocity", "command", "aim, 1e-09"]),
-        (SEVERAL[::-1], ["position", "velocity", "quaternion", "angular velocity", "command", "aim, 1e-09"]),
-        (SEVERAL[3:], ["command", "aim, 1e-09"]),
+        (SEVERAL, ["position", "velocity", "quaternion", "angular velocity", "command", "aim, $10^{-9}$"]),
+        (SEVERAL[::-1], ["position", "velocity", "quaternion", "angular velocity", "command", "aim, $10^{-9}$"]),
+        (SEVERAL[3:], ["command", "aim, $10^{-9}$"]),
     ):
         (legend,) = figure.agreement_chart(found).legends
         assert [text.get_text() for text in legend.get_texts()] == names
