@@ -29,6 +29,8 @@ STEPS, LIVE = "docs/drag_the_clock.md", "paper_flight.html"
 ENOUGH = 2
 """Refuters that must have been flown, else a claim is marked"""
 ONE_ONLY = "one comparison only"
+COMPARED = "quadcosim compare studies/comparisons/"
+"""Words that attempts do not repeat"""
 MARKED = re.compile(r"<!-- (claims? .+?) -->")
 """Places of pages that are written from the records"""
 FILES = {
@@ -164,7 +166,7 @@ def told(claim: Claim) -> str:
         "",
     ]
     for one in claim.tried:
-        how = "" if one.command == claim.command else f" (`{one.command}`)"
+        how = "" if one.command == claim.command else f" (`{one.command.removeprefix(COMPARED)}`)"
         lines.append(wrapped(f"- {one.against}: {_filled(claim, one.number)}{how}: *{one.verdict}*", "  "))
     return "\n".join([*lines, "", wrapped(f"*Not tried:* {claim.not_tried}.")])
 

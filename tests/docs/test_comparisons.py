@@ -21,7 +21,7 @@ FLOWN = sorted(comparisons.NAMES)
 def test_every_comparison_of_the_pages_is_kept_and_said_how_to_fly() -> None:
     assert all((comparisons.DATA / f"{name}.json").is_file() for name in FLOWN)
     text = " ".join(word for page in PAGES for word in page.read_text(encoding="utf-8").split())
-    assert {*re.findall(r"quadcosim compare studies/comparisons/(\w+)\.toml", text)} >= {*FLOWN}
+    assert {*re.findall(r"(?:quadcosim compare studies/comparisons/|`)(\w+)\.toml", text)} >= {*FLOWN}
 
 
 def test_every_picture_of_a_comparison_is_drawn_from_what_is_kept() -> None:
