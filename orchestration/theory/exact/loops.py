@@ -133,7 +133,8 @@ class Loops:
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
-                    f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated"
+                    f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated, or a "
+                    "component that integrates more accurately"
                 )
         return Linear(
             parts=parts, methods=methods, accuracy=accuracy, objectives=objectives, noise=noise, initial=initial_state

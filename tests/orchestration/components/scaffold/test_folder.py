@@ -19,6 +19,7 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.linearise import linearise
 from orchestration.theory.stability.local_limit import local_limits
 from quadcosim import bode, expect, margin
@@ -98,19 +99,19 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
 
 
 @in_test_all
-def test_the_pendulum_has_the_local_limit_of_its_own_integrator(here: Path) -> None:
-    """The radius of the loop is 1 at .226652 s, by the matrices of its semi-implicit Euler steps about upright."""
+def test_the_pendulum_has_the_local_limit_of_theory(here: Path) -> None:
+    """The radius of the loop is 1 there, by the matrix exponential of the plant about upright."""
     write("plant", "pendulum", here, author="Ada", license="MIT")
     builder.build_slaves(builder.slaves_of(here / "pendulum"), here / "pendulum" / "native", packing=builder.NATIVE)
     system = fmus.native_twins(load_system(here / "pendulum" / "system.toml"))
     varied = Varied(request=system, of="components.controller.sampling.period")
     found = local_limits(varied, Range(first=0.05, step=0.05, last=0.25, tolerance=5e-4))
-    assert found.limit == pytest.approx(0.226652, abs=5e-6)
+    assert found.limit == pytest.approx(0.225981, abs=5e-6)
     assert len(linearise(system).rest.A) == 2
 
 
 def _expect_linear_theory(system: System) -> None:
-    """It has margins and an LQR; where its integrator is too coarse for an answer, the message has what to change."""
+    """It has margins, poles, an LQR, an expectation, and a certificate."""
     control = pytest.importorskip("control")
     (margins,) = bode(system).loops
     assert margins.gain_margin == pytest.approx(0.5 * 9.81 * 0.4 / 4.0, rel=1e-3), "k_p is m g l there"
@@ -118,11 +119,10 @@ def _expect_linear_theory(system: System) -> None:
     gain, _, poles = control.dlqr(loop.rest.to_control(), np.eye(2), np.eye(1))
     assert gain.shape == (1, 2)
     assert np.abs(poles).max() < 1.0
-    with pytest.raises(UsageError, match=r"no linear system in continuous time: .*expected as_simulated"):
-        expect(system)
-    assert expect(system, as_simulated=True).mean_square_radius == pytest.approx(loop.radius**2, rel=1e-4)
-    with pytest.raises(UsageError, match="expected a component that integrates more accurately"):
-        margin(system, "connections.command.delay_jitter")
+    expected = expect(changed(system, {"connections.measurement.noise": 0.001}))
+    assert expected.mean_square_radius == pytest.approx(loop.radius**2, rel=1e-4)
+    assert expected.objectives["error_rms"] == pytest.approx(3.18805e-4, rel=1e-5), "by Lyapunov's equation"
+    assert margin(system, "connections.command.delay_jitter").certified == pytest.approx(0.01, rel=1e-6)
 
 
 @pytest.mark.parametrize(
