@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import verdicts
+from orchestration.command import printed_tables, verdicts
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
+from orchestration.command.printed_tables import TABLE
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import Dask, Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.errors import UsageError
@@ -34,23 +35,18 @@ def compare(
     time_limit: TimeLimit = None,
     cell: Annotated[int | None, option("--cell", "Run only this cell again.", "K")] = None,
     start: Annotated[int | None, option("--start", "One run of that cell, kept in --out DIR.", "I")] = None,
-    table: Annotated[
-        str | None,
-        option("--table", "Print the cells with their intervals as a table of that format.", "csv|markdown|latex"),
-    ] = None,
+    table: Annotated[str | None, TABLE] = None,
     figures: Annotated[bool, typer.Option(help="Draw the pictures beside the tables.")] = True,
     *,
     look: FigureFlags,
 ) -> CommandResult:
     """Compare controllers from the same initial conditions: survival, settling, limits, error and effort."""
-    from orchestration.command.comparison_table import expect_format
     from orchestration.experiments.comparison import run
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.simulation.workers.choice import engine_choice
 
     how = engine_choice(engine)
-    if table is not None:
-        expect_format(table)
+    printed_tables.expect_format(table)
     loaded = dataclasses.replace(load_comparison(comparison), native=native)
     if table is not None and cell is not None:
         raise UsageError("--table: expected no --cell; the table has all cells")
@@ -75,7 +71,8 @@ def compare(
 
 def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table: str | None) -> CommandResult:
     """The results of all cells, as text or in the format of a `table`; `again` is the command for one of them."""
-    from orchestration.command import comparison_table, comparison_text
+    from orchestration.command import comparison_text
+    from orchestration.command.comparison_table import comparison_table
     from orchestration.experiments.comparison.outcome import as_json
 
     summary = compared.summary
@@ -94,7 +91,7 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table
         lines = list(comparison_text.lines(comparison, compared.outcome))
         return CommandResult(document=document, verdict=verdict, lines=lines, good=not summary.failed)
     inform(verdict)  # standard output is the table alone, for a file
-    lines = list(comparison_table.lines(comparison, compared.outcome, table))
+    lines = list(printed_tables.lines(comparison_table(comparison, compared.outcome), table))
     return CommandResult(document={"verdict": verdict, **document}, lines=lines, good=not summary.failed)
 
 

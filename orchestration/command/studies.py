@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import exact
+from orchestration.command import exact, printed_tables
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
+from orchestration.command.printed_tables import TABLE
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import Dask, Out, StudyEngineFlag, TimeLimit, Workers
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
 
 if TYPE_CHECKING:
@@ -106,17 +108,31 @@ def export(
         list[str] | None,
         option("--format", "Default: parquet and csv of a study, csv of a run; may be repeated.", "csv|mat|parquet"),
     ] = None,
+    table: Annotated[str | None, TABLE] = None,
 ) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies import exporting
     from orchestration.experiments.studies.store import store_path
     from orchestration.experiments.studies.study_file import load_study
 
+    printed_tables.expect_format(table)
+    if what.is_dir() and table is not None:
+        raise UsageError(f"{what}: expected a study file with --table")
     if what.is_dir() and not store_path("", what).is_file():
         return result_of_files(exporting.of_run(what, out or what, formats or ()))
     if what.is_dir():
         return result_of_files(exporting.of_study(store_path("", what), formats or ()))
-    return result_of_files(exporting.of_study(_current_store(what, out), formats or (), load_study(what)))
+    store, study = _current_store(what, out), load_study(what)
+    if table is None:
+        return result_of_files(exporting.of_study(store, formats or (), study))
+    from orchestration.command.study_table import study_table
+
+    printed = study_table(study, store)
+    written = exporting.of_study(store, formats or (), study)
+    for path in written:
+        inform(str(path))  # standard output is the table alone, for a file
+    lines = list(printed_tables.lines(printed, table))
+    return CommandResult(document=result_of_files(written).document, lines=lines)
 
 
 @option_group("look", FigureFlags)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -94,16 +94,31 @@ def differ(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
     return low > 0.0 or high < 0.0
 
 
-def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: str) -> "pd.DataFrame":
+class TwoLaws(NamedTuple):
+    """The two values of an axis of names, in the order of the runs."""
+
+    axis: str
+    first: str
+    second: str
+
+
+def laws_of(table: "pd.DataFrame", by: Sequence[str]) -> TwoLaws | None:
+    """The laws of a table, if just one of the axes `by` has names, and these are two."""
+    axes = [name for name in by if table[name].map(type).eq(str).all()]
+    found = [TwoLaws(name, *table[name].unique()) for name in axes if table[name].nunique() == 2]
+    return found[0] if len(found) == 1 else None
+
+
+def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "pd.DataFrame":
     """The second law minus the first, by the values of the other axes: `difference`, `low` and `high`.
 
-    `laws` is the axis of two names; the columns `law` and `minus` have them, in the order of the runs.
+    The columns `law` and `minus` have the laws.
     """
     import pandas as pd
 
-    second, first = reversed(table[laws].unique())
-    cells, others = shares_of(table, by), [name for name in by if name != laws]
-    both = cells[cells[laws] == second].merge(cells[cells[laws] == first], on=others, suffixes=("", ".other"))
+    axis, first, second = laws
+    cells, others = shares_of(table, by), [name for name in by if name != axis]
+    both = cells[cells[axis] == second].merge(cells[cells[axis] == first], on=others, suffixes=("", ".other"))
     rows = []
     for row in both.to_dict("records"):
         one, other = ({name: row[name + end] for name in ("share", "low", "high")} for end in ("", ".other"))

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from fmu_kit.new_files import new_files
-from orchestration.experiments.studies.shares import differences_of, shares_of, with_chance
+from orchestration.experiments.studies.shares import differences_of, laws_of, shares_of, with_chance
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
@@ -124,8 +124,8 @@ def export(
     if study is not None and study.cell_names is not None:
         cells, repeated = study.cell_names, with_chance(rows, study)
         tables["shares"] = shares_of(repeated, cells)
-        laws = [name for name in cells if rows[name].map(type).eq(str).all() and rows[name].nunique() == 2]
-        tables |= {"differences": differences_of(repeated, cells, laws[0])} if len(laws) == 1 else {}
+        if (laws := laws_of(rows, cells)) is not None:
+            tables["differences"] = differences_of(repeated, cells, laws)
     written = []
     with new_files(folder) as new:
         for name, content in tables.items():

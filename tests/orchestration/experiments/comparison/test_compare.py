@@ -268,7 +268,7 @@ def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
     ("form", "first", "fourth"),
     [
         ("markdown", "| controller | period [ms] | loss | survives |", "| coupled | 20 | 0.3 | 1.000 [0.342, 1.000] |"),
-        ("latex", r"\begin{tabular}{lllllll}", r"\midrule"),
+        ("latex", r"\begin{table}  % needs \usepackage{booktabs}", r"\begin{tabular}{lllllll}"),
         ("csv", "cell,vehicle,condition,controller,period,loss,count,", "2,base,loss 0,uncoupled,0.02,0.0,2,"),
     ],
 )
@@ -280,6 +280,7 @@ def test_a_comparison_is_printed_as_a_table(
     lines = main("compare", "two.toml", "--native", "--no-figures", "--table", form).stdout.splitlines()
     assert lines[0].startswith(first)
     assert lines[3].startswith(fourth)
+    assert form == "csv" or "Shares of 2 initial conditions" in "".join(lines)
 
 
 def test_an_unknown_table_or_a_third_axis_is_refused(folder: Path, main: Main) -> None:

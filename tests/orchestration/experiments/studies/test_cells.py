@@ -10,9 +10,11 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 
+from orchestration.command.printed_tables import PrintedTable, lines
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
+    TwoLaws,
     cells_of,
     differ,
     differences_of,
@@ -89,9 +91,11 @@ def test_two_shares_differ_where_newcombes_interval_excludes_0() -> None:
     assert differ(cell(0, 20), cell(10, 10))
     assert not differ(cell(5, 56), cell(0, 29))
     assert interval_of_difference(cell(56, 70), cell(48, 80)) == pytest.approx((0.0524, 0.3339), abs=5e-5)
-    found = differences_of(runs(), ["controller", "timing.period", "timing.loss"], "controller").set_index(
-        ["timing.period", "timing.loss"]
-    )
+    found = differences_of(
+        runs(),
+        ["controller", "timing.period", "timing.loss"],
+        TwoLaws("controller", "UnifiedController", "CascadedController"),
+    ).set_index(["timing.period", "timing.loss"])
     assert found.loc[(0.01, 0.1), "difference"] == 3 / 8 - 1.0
     expected = interval_of_difference(cell(3, 8), cell(8, 8))
     assert tuple(found.loc[(0.01, 0.1), ["low", "high"]]) == expected
@@ -196,6 +200,13 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert list(differences) == ["law", "minus", "timing.period", "difference", "low", "high"]
     assert differences["minus"].tolist() == ["UnifiedController"] * 2
     assert differences[["low", "high"]].isna().all(axis=None)
+    done = main("export", "study.toml", "--format", "csv", "--table", "latex")
+    assert str(STORE.with_name("runs.csv")) in done.stderr
+    table = done.stdout.splitlines()
+    assert table[0] == r"\begin{table}  % needs \usepackage{booktabs}"
+    assert r"of 2 in each cell, with 95 \% Wilson intervals; difference: CascadedController minus" in table[2]
+    assert table[5] == r"period [ms] & UnifiedController & CascadedController & difference \\"
+    assert table[7] == r"10 & 0.00 & 0.00 & 0.00 \\"
     with closing(sqlite3.connect(tmp_path / STORE)) as store, store:
         store.execute("DELETE FROM runs WHERE key = (SELECT key FROM design WHERE design_index = 7)")
     for command in ("draw", "export"):
@@ -206,6 +217,17 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     )
     monkeypatch.setattr(drawing, "frame", lambda store: frame(store).assign(status=None))
     assert "expected at least one finished run" in main("draw", "study.toml", code=2).stderr
+
+
+def test_a_printed_table_has_nothing_that_tex_reads_otherwise() -> None:
+    table = PrintedTable(
+        caption="50 % of law_a", heads=["law_a & b", "share"], rows=[["#1", "-0.4 [-1, 2]"]], numbers=[]
+    )
+    text = "\n".join(lines(table, "latex"))
+    assert r"\caption{50 \% of law\_a}" in text
+    assert r"law\_a \& b & share \\" in text
+    assert r"\#1 & $-$0.4 [$-$1, 2] \\" in text
+    assert [*lines(table, "markdown")][-2:] == ["", "50 % of law_a"]
 
 
 def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:
