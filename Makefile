@@ -1,5 +1,5 @@
 # make demo: build the FMUs, fly the paper's scenario, draw it. make test: lint and run the tests.
-# make test-all: the same, with the whole of what make test has a sample of. Before a release.
+# make test-all: the same, with the whole of what make test has a sample of (CONTRIBUTING.md). Before a release.
 # make check: lint and the most informative fast tests, under a minute, for while you work.
 # make coverage: all tests, and which lines they run. make site: the documentation as a site, in site/.
 # make bench: time the loop. make figures, make findings, make interop: figures, tables and icons of docs/ and examples/.

@@ -11,6 +11,7 @@ import pytest
 import quadcosim
 from fmu_kit.algebra import Quaternion, Vec3
 from quadcosim import System
+from tests.extent import in_test_all
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.places import EXAMPLES
@@ -91,6 +92,7 @@ SLAVES = {"unit": "InertialUnit", "receiver": "Receiver", "filter": "KalmanFilte
 ROW = re.compile(r"\| .+? \| ([\d.]+) m \| ([\d.]+) m \| ([\d.]+) m \| (\d+) N\.m \|(.*?)\|")
 
 
+@in_test_all
 @needs_compiler
 def test_the_page_has_what_its_commands_print(system: System) -> None:
     rows = ROW.findall((FOLDER / "README.md").read_text(encoding="utf-8"))

@@ -14,6 +14,7 @@ from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.systems.system.component import Parameter
 from orchestration.theory.stability.period_map import growth_of_loop
 from quadcosim import Scenario, Timing
+from tests.extent import in_test_all
 from tests.native import native
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.theory.stability.test_linearise import closed
@@ -109,6 +110,7 @@ rate = 8.0
 """
 
 
+@in_test_all
 def test_an_lqi_against_the_law_of_the_paper_has_the_same_shares_through_compare_as_through_run(tmp_path: Path) -> None:
     path = tmp_path / "lqi.toml"
     path.write_text(COMPARISON.format(folder=FOLDER))

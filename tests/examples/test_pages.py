@@ -34,7 +34,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", sample([*commands("run"), *commands("show"), *commands("build")], 6), ids=" ".join)
+@pytest.mark.parametrize("command", sample([*commands("run"), *commands("show"), *commands("build")], 3), ids=" ".join)
 def test_a_command_that_is_shown_works(command: list[str], here: Path, main: Main) -> None:
     done = main(*command)
     assert done.returncode == 0, done.stderr

@@ -61,14 +61,15 @@ def test_nesting_that_is_allowed_is_read() -> None:
 def test_a_flipped_bit_of_the_bytes_is_refused_or_changes_nothing(model: type[Slave]) -> None:
     state, refused = saved(model), 0
     content = serialise(state)
-    for place in range(len(content)):
+    places = sample(range(len(content)), 400)
+    for place in places:
         flipped = bytearray(content)
         flipped[place] ^= 1 << place % 8
         if (found := deserialise(bytes(flipped))) != state:
             refused += 1
             slave = model(instance_name="damaged")
             assert_fails(lambda: slave._set_fmu_state(found), "FMU state (")  # noqa: B023
-    assert refused > 0.99 * len(content)
+    assert refused > 0.99 * len(places)
 
 
 def test_a_state_whose_checksum_is_another_is_refused_in_words() -> None:
@@ -139,7 +140,7 @@ SAVED = {model: saved(model) for model in MODELS}
 PLACES = {model: [path for path in places(SAVED[model]) if path] for model in MODELS}
 
 
-@settings(max_examples=tries(300, sampled=25))
+@settings(max_examples=tries(300, sampled=12))
 @given(st.data())
 def test_a_state_damaged_anywhere_is_refused_or_gives_values_that_can_be_read(data: st.DataObject) -> None:
     model = data.draw(st.sampled_from(MODELS))

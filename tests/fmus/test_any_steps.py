@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from hypothesis.stateful import run_state_machine_as_test as run_machine
 
-from tests.extent import tries
+from tests.extent import in_test_all, tries
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance
 
@@ -41,6 +41,7 @@ def test_time_that_is_off_by_1e_12_hardly_moves_the_plant(plant: Instance) -> No
     assert arrived[0] == pytest.approx(arrived[1], abs=1e-11)
 
 
+@in_test_all
 def test_time_added_up_over_30_s_neither_loses_nor_delays_a_sample(controller: Instance) -> None:
     controller.initialise(MEASUREMENT)
     t = 0.0
@@ -218,7 +219,7 @@ class AnyMaster(RuleBasedStateMachine):
 
 def test_any_sequence_of_steps_samples_at_the_due_times(controller: Instance) -> None:
     machine: Any = partial(AnyMaster, controller)
-    run_machine(machine, settings=hypothesis.settings(max_examples=tries(60, sampled=15), stateful_step_count=40))
+    run_machine(machine, settings=hypothesis.settings(max_examples=tries(60, sampled=6), stateful_step_count=40))
 
 
 T = 0.1

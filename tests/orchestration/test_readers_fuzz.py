@@ -211,7 +211,7 @@ def is_read_or_refused(read: Callable[[], object]) -> None:
 
 
 fuzz = settings(
-    max_examples=tries(150, sampled=37),
+    max_examples=tries(150, sampled=15),
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 
@@ -255,7 +255,7 @@ def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "SystemStructure.ssd"
 
 
-@settings(fuzz, max_examples=tries(100, sampled=25))
+@settings(fuzz, max_examples=tries(100, sampled=10))
 @given(CUTS.map(lambda cuts: damaged(TIMING.encode(), cuts)) | with_another_value(TIMING))
 @example(TIMING.encode())
 @example(b"components = 3")
@@ -289,7 +289,7 @@ def run_files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@settings(fuzz, max_examples=tries(60, sampled=15))
+@settings(fuzz, max_examples=tries(60, sampled=6))
 @given(st.sampled_from(RUN_FILES), CUTS)
 def test_a_directory_of_a_run(tmp_path: Path, run_files: dict[str, bytes], name: str, cuts: list[Cut]) -> None:
     for other, content in run_files.items():

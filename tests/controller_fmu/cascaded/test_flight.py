@@ -13,6 +13,7 @@ from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.period_map import growth_of_loop
 from quadcosim import Result, Scenario, Timing, UsageError
+from tests.extent import in_test_all
 from tests.native import assert_the_same, natives
 
 NAME, PLANT = "CascadedController", "QuadrotorPlant"
@@ -55,6 +56,7 @@ def test_a_controller_that_remembers_has_no_loop_about_hover_of_the_vehicle_alon
         HoverLoop.of(scenario.with_fmus(plant=f"native/{PLANT}", controller=f"native/{NAME}"))
 
 
+@in_test_all
 def test_in_c_it_flies_as_in_python_to_the_byte(built: dict[str, Path], tmp_path: Path) -> None:
     fmu = natives([Target.parse(MODELS[NAME])], tmp_path, "libm")[NAME]
     timing = Timing(period=0.004, jitter=0.001, measurement_loss=0.05)

@@ -17,6 +17,7 @@ from fmu_kit.compiler.pack.c_compiler import compiled_for, targets_of, universal
 from fmu_kit.compiler.pack.c_compiler import compiler as compiler_here
 from orchestration.components.building import builder, fmus
 from orchestration.components.checks.doctor.binaries import newest, read
+from tests.extent import in_test_all, sample
 
 needs_zig = pytest.mark.skipif(
     importlib.util.find_spec("ziglang") is None, reason="no zig: pip install 'quadcosim[cross]'"
@@ -34,6 +35,8 @@ LIBRARIES = {
     },
 }
 PACKINGS = {2: builder.NATIVE, 3: builder.NATIVE_FMI_3}
+CROSSED = sample([*PACKINGS], 1)
+"""The versions of FMI in which it is built for all systems."""
 
 
 def built(folder: Path, version: int, systems: str = "all") -> Path:
@@ -44,7 +47,7 @@ def built(folder: Path, version: int, systems: str = "all") -> Path:
 @pytest.fixture(scope="module")
 def crossed(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     """The plant for all systems, by the version of FMI."""
-    return {version: built(tmp_path_factory.mktemp(f"fmi{version}"), version) for version in PACKINGS}
+    return {version: built(tmp_path_factory.mktemp(f"fmi{version}"), version) for version in CROSSED}
 
 
 def libraries(fmu: Path) -> dict[str, bytes]:
@@ -127,7 +130,7 @@ def test_without_any_compiler_for_a_system_it_says_what_to_install(
 
 
 @needs_zig
-@pytest.mark.parametrize("version", PACKINGS)
+@pytest.mark.parametrize("version", CROSSED)
 def test_for_linux_on_arm_it_needs_what_old_systems_have(version: int, crossed: dict[int, Path]) -> None:
     found = read(io.BytesIO(libraries(crossed[version])[f"aarch64-linux/{MODEL}.so"]))
     assert (found.system, found.architectures) == ("Linux", ("aarch64",))
@@ -137,11 +140,12 @@ def test_for_linux_on_arm_it_needs_what_old_systems_have(version: int, crossed: 
 
 
 @needs_zig
-@pytest.mark.parametrize("version", PACKINGS)
+@pytest.mark.parametrize("version", CROSSED)
 def test_there_is_a_library_for_each_system_by_its_name_in_the_version(version: int, crossed: dict[int, Path]) -> None:
     assert libraries(crossed[version]).keys() == LIBRARIES[version]
 
 
+@in_test_all
 @needs_zig
 def test_two_builds_of_a_library_are_the_same_bytes(crossed: dict[int, Path], tmp_path: Path) -> None:
     again = libraries(built(tmp_path, 2, "win64"))
@@ -150,7 +154,7 @@ def test_two_builds_of_a_library_are_the_same_bytes(crossed: dict[int, Path], tm
 
 
 @needs_zig
-@pytest.mark.parametrize("version", PACKINGS)
+@pytest.mark.parametrize("version", CROSSED)
 def test_on_linux_it_flies_to_the_bytes_of_the_one_that_cc_compiles(version: int, crossed: dict[int, Path]) -> None:
     here = fmus.locate(f"{PACKINGS[version].folder}/{MODEL}")
     mine, others = (
@@ -160,6 +164,7 @@ def test_on_linux_it_flies_to_the_bytes_of_the_one_that_cc_compiles(version: int
     assert mine.tobytes() == others.tobytes()
 
 
+@in_test_all
 @needs_zig
 def test_for_macos_there_are_both_processors(crossed: dict[int, Path]) -> None:
     found = slices(libraries(crossed[2])[f"darwin64/{MODEL}.dylib"])
@@ -181,7 +186,7 @@ def test_for_macos_it_needs_the_systems_library_alone_and_is_signed_where_it_mus
 
 
 @needs_zig
-@pytest.mark.parametrize("version", PACKINGS)
+@pytest.mark.parametrize("version", CROSSED)
 def test_for_windows_it_exports_fmi_and_needs_what_each_has(version: int, crossed: dict[int, Path]) -> None:
     (content,) = (library for name, library in libraries(crossed[version]).items() if name.endswith(".dll"))
     library = pefile.PE(data=content)

@@ -23,7 +23,7 @@ from orchestration.components.building import fmus
 from orchestration.components.building.models import MODELS
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from tests.commands import Main
-from tests.extent import sample
+from tests.extent import in_test_all, sample
 from tests.fmu_kit.compiler.compiled import compiled
 from tests.fmus.archive import files_of
 from tests.fmus.expected import COMMAND, MEASUREMENT
@@ -336,6 +336,7 @@ def test_two_instances_know_nothing_of_each_other(controller: Instance, tmp_path
     assert controller.messages == []
 
 
+@in_test_all
 def test_the_whole_life_of_an_instance_is_clean_for_the_sanitizers(tmp_path: Path) -> None:
     sources = Path(fmpy.extract(str(fmus.locate("native/fmi3/QuadrotorPlant")), str(tmp_path))) / "sources"
     options = ("-I", str(sources), "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")

@@ -31,7 +31,7 @@ FIXED = st.fixed_dictionaries(
 )
 
 
-@pytest.fixture(scope="module", params=sample(PROBES, 5))
+@pytest.fixture(scope="module", params=sample(PROBES, 3))
 def probe(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Target, Path]:
     """Each slave in turn, and the library that it is compiled to."""
     compiler("cc")
@@ -44,7 +44,7 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
     slave = slave_class(target)
     reset = InC.made(slave, path)
 
-    @settings(derandomize=True, max_examples=tries(150, sampled=37), database=None)
+    @settings(derandomize=True, max_examples=tries(150, sampled=15), database=None)
     @given(start=INPUTS, fixed=FIXED, steps=STEPS)
     def answer_alike(start: Values, fixed: Values, steps: list[Values]) -> None:
         given = {**start, **fixed}
@@ -56,7 +56,7 @@ def test_a_slave_in_c_answers_as_in_python(probe: tuple[Target, Path]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "mode"), sample([*((name, "as_it_is") for name in PROBES), ("Choices", "doubled")], 3)
+    ("name", "mode"), sample([*((name, "as_it_is") for name in PROBES), ("Choices", "doubled")], 2)
 )
 def test_a_slave_with_values_that_are_fixed_answers_in_c_as_in_python(name: str, mode: str, tmp_path: Path) -> None:
     compiler("cc")
@@ -65,7 +65,7 @@ def test_a_slave_with_values_that_are_fixed_answers_in_c_as_in_python(name: str,
     slave = slave_class(target)
     reset = InC.made(slave, library(target, tmp_path))
 
-    @settings(derandomize=True, max_examples=tries(30, sampled=10), database=None)
+    @settings(derandomize=True, max_examples=tries(30, sampled=5), database=None)
     @given(start=INPUTS, q=st.sampled_from([0.25, 2.0, 1e-3]), steps=st.lists(INPUTS, max_size=5))
     def answer_alike(start: Values, q: float, steps: list[Values]) -> None:
         expected = answers(InPython(slave(instance_name="probe")), {**start, "q": q}, steps)

@@ -20,7 +20,7 @@ from fmpy.fmi1 import FMICallException
 from tests.extent import tries
 from tests.fmus.instance import Instance
 
-CALLS, MAX_INSTANCES = tries(2000, sampled=600), 4
+CALLS, MAX_INSTANCES = tries(2000, sampled=250), 4
 VALUES = (0.0, 1.0, -1.0, 0.5, 1e200, 1e308, math.nan)
 GARBAGE = (b"", b"{}", b"[]", b'{"model": 1, "reals": 3}', b'{"model": "QuadrotorPlant", "reals": []}')
 

@@ -11,7 +11,7 @@ from fmpy import fmi2
 
 from tests.extent import tries
 
-THREADS, REPETITIONS = 8, tries(100, sampled=20)
+THREADS, REPETITIONS = 8, tries(100, sampled=8)
 SWITCH_INTERVAL = 1e-5
 """[s]; Python's own 5 ms would let most instantiations run through."""
 

@@ -518,6 +518,7 @@ def damaged(fmu: Path, path: Path) -> Path:
     return path
 
 
+@in_test_all
 def test_validate_ends_with_1_for_a_damaged_fmu(built: dict[str, Path], here: Path, main: Main) -> None:
     done = main("validate", damaged(built["QuadrotorPlant"], here / "damaged.fmu"), code=1)
     assert "damaged.fmu" in done.stdout + done.stderr

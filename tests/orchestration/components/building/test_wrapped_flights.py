@@ -24,7 +24,7 @@ from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.simulation import run
 from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
 from tests.commands import Main
-from tests.extent import sample
+from tests.extent import in_test_all, sample
 from tests.orchestration.components.building.test_wrap import PD, PD_C, PD_H
 from tests.places import ROOT
 
@@ -235,6 +235,7 @@ def wrapped(name: str, folder: Path) -> Path:
     return folder / f"{name}.toml"
 
 
+@in_test_all
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, exported: Path) -> None:
     flight = Scenario(stop_time=0.5, plant=FmuChoice(fmu="native/QuadrotorPlant"))

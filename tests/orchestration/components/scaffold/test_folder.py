@@ -158,6 +158,7 @@ def test_names_are_in_the_case_that_python_has_them_in() -> None:
     assert [module_name(class_name(name)) for name in names] == ["hover_pd", "hover_pd", "hover_pd", "pid"]
 
 
+@in_test_all
 def test_the_page_of_a_controller_says_how_far_from_the_target_wind_keeps_it_on_a_small_vehicle(
     here: Path, main: Main
 ) -> None:

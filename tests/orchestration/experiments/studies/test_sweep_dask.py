@@ -20,7 +20,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError
 from tests.commands import Main
-from tests.extent import in_test_all, sample
+from tests.extent import in_test_all
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 from tests.orchestration.experiments.studies.common import (
     PERIODS,
@@ -57,6 +57,7 @@ def test_a_dask_cluster_makes_the_same_rows(
     assert bits(folder / STORE) == reference
 
 
+@in_test_all
 @needs_compiler
 def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_with_the_reason(tmp_path: Path, cluster: Cluster) -> None:
     fmu = known(small(tmp_path, "ENDS=if (m->s.gain == 3.0) for (;;) usleep(1000)"))
@@ -141,6 +142,7 @@ def test_the_store_can_be_used_after_a_missing_scheduler(tmp_path: Path) -> None
     assert sweep(study(PERIODS), folder=tmp_path).flown == 2
 
 
+@in_test_all
 @pytest.mark.usefixtures("impatient")
 def test_a_scheduler_without_workers_is_reported_in_one_line(tmp_path: Path) -> None:
     said = "expected a dask scheduler with workers there"
@@ -207,7 +209,8 @@ def test_a_scheduler_that_answers_again_is_waited_for_anew(capsys: pytest.Captur
     assert len(said(capsys)) == 1
 
 
-@pytest.mark.parametrize("end", sample([signal.SIGSTOP, signal.SIGKILL], 1))
+@in_test_all
+@pytest.mark.parametrize("end", [signal.SIGSTOP, signal.SIGKILL])
 def test_a_scheduler_that_is_stopped_ends_the_sweep_in_one_line_and_it_can_be_resumed(
     end: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -116,6 +116,7 @@ def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
     assert tally.kills == kills
 
 
+@in_test_all
 @needs_compiler
 def test_a_sweep_in_lanes_whose_coordinator_is_killed_has_the_same_bits(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"

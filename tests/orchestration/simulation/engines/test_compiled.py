@@ -136,7 +136,7 @@ def of(system: System, fmu: Path, **parameters: Mapping[str, float]) -> System:
     return replace(system, components=parts)
 
 
-@settings(max_examples=tries(60, sampled=15), derandomize=True, deadline=None)
+@settings(max_examples=tries(60, sampled=6), derandomize=True, deadline=None)
 @given(systems(), st.sampled_from((1, 7, 2**13)))
 def test_random_systems_run_the_same_in_schedules_of_any_length(
     fmu: Path, kept: Kept, what: System, instants: int
@@ -325,7 +325,7 @@ def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: P
     assert_the_same(resume(tmp_path / "paused", engine=then), ran(system, "python"))
 
 
-@settings(max_examples=tries(30, sampled=10), derandomize=True, deadline=None)
+@settings(max_examples=tries(30, sampled=5), derandomize=True, deadline=None)
 @given(systems(most=4), st.floats(0.0, 1.0), st.tuples(ENGINES, ENGINES), st.sampled_from((5, instant_arrays.INSTANTS)))
 def test_random_systems_go_on_from_a_pause_as_if_there_was_none(
     fmu: Path, kept: Kept, what: System, share: float, engines: tuple[Any, Any], size: int

@@ -65,7 +65,7 @@ def test_random_systems_on_computers_run_the_same_in_schedules_of_any_length(
         assert_the_same(both(of(what, fmu), load=kept.load), whole)
 
 
-@settings(max_examples=tries(30, sampled=10), derandomize=True, deadline=None)
+@settings(max_examples=tries(30, sampled=5), derandomize=True, deadline=None)
 @given(
     systems_on_computers(),
     st.floats(0.0, 1.0),
@@ -243,7 +243,7 @@ def crowds(draw: st.DrawFn) -> list[System]:
     return crowd
 
 
-@settings(max_examples=tries(30, sampled=10), derandomize=True, deadline=None)
+@settings(max_examples=tries(30, sampled=5), derandomize=True, deadline=None)
 @given(crowds())
 def test_systems_on_computers_have_the_same_bits_in_lanes_beside_others(
     fmu: Path, kept: Kept, crowd: list[System]

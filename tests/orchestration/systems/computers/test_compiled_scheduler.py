@@ -24,7 +24,7 @@ def parts_of(system):
 
 
 @needs_compiler
-@settings(max_examples=tries(120, sampled=30), derandomize=True, deadline=None)
+@settings(max_examples=tries(120, sampled=12), derandomize=True, deadline=None)
 @given(systems_on_computers(), st.lists(st.integers(0, 400_000_000), max_size=5).map(sorted))
 def test_random_computers_and_networks_have_the_same_notes_in_python_and_in_c(what: System, until: list[int]) -> None:
     ours, theirs = Scheduler(parts_of(what)), CompiledScheduler(parts_of(what))

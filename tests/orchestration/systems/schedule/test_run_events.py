@@ -17,7 +17,7 @@ from tests.orchestration.simulation.engines.systems_on_computers import systems_
 NO_MESSAGES = np.zeros((0, 4), dtype=np.int64)
 
 
-@settings(max_examples=tries(40, sampled=10), derandomize=True, deadline=None)
+@settings(max_examples=tries(40, sampled=5), derandomize=True, deadline=None)
 @given(systems_on_computers(), st.lists(st.tuples(st.floats(0.0, 1.0), st.booleans()), max_size=8))
 def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
     system: System, parts: list[tuple[float, bool]]
@@ -34,7 +34,7 @@ def test_events_are_the_same_in_parts_of_any_length_and_behind_any_time(
     assert found == expected
 
 
-@settings(max_examples=tries(40, sampled=10), derandomize=True, deadline=None)
+@settings(max_examples=tries(40, sampled=5), derandomize=True, deadline=None)
 @given(systems_on_computers())
 def test_events_agree_with_the_jobs_and_frames(system: System) -> None:
     timeline = timeline_of(system)

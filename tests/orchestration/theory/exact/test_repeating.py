@@ -58,7 +58,7 @@ def tasks_of_any(draw: st.DrawFn, number: int, component: str | None) -> Task:
     )  # fmt: skip
 
 
-@settings(max_examples=tries(120, sampled=30), derandomize=True, deadline=None)
+@settings(max_examples=tries(120, sampled=12), derandomize=True, deadline=None)
 @given(timetables())
 def test_a_hundred_common_periods_later_the_same_happens(system: System) -> None:
     try:

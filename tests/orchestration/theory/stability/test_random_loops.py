@@ -246,7 +246,7 @@ def instances() -> Iterator[Instances]:
 @pytest.mark.parametrize(
     ("kind", "seed"),
     [
-        *(("native", seed) for seed in range(tries(20, sampled=3))),
+        *(("native", seed) for seed in range(tries(20, sampled=2))),
         *(("python", seed) for seed in range(20, tries(24, sampled=21))),
     ],
 )

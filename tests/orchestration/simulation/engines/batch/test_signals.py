@@ -54,7 +54,7 @@ def crowds(draw: st.DrawFn) -> list[System]:
     return crowd
 
 
-@settings(max_examples=tries(40, sampled=10), derandomize=True, deadline=None)
+@settings(max_examples=tries(40, sampled=5), derandomize=True, deadline=None)
 @given(crowds(), st.sampled_from((1, 70, schedule_cache.INSTANTS)))
 def test_random_systems_have_the_same_signals_beside_any_others(
     fmu: Path, kept: Kept, crowd: list[System], instants: int

@@ -46,6 +46,7 @@ def others(other: Scenario) -> list[Agreement]:
     return agreements(other, chosen(None, LOOP.ports))
 
 
+@in_test_all
 def test_every_tool_simulates_the_parameters_of_the_scenario(others: list[Agreement]) -> None:
     assert [agreement.tool.name for agreement in others] == [tool.name for tool in chosen(None, LOOP.ports)]
     for agreement in others:
