@@ -75,10 +75,11 @@ def register() -> None:
 def _flight(settings: dict[str, Any]) -> dict[str, Any]:
     """The arguments of an environment of the flight: the defaults that are not given."""
     from orchestration.quadrotor.scenarios.scenario import Scenario
+    from orchestration.simulation.requests.request import request_of
 
-    scenario = settings.pop("scenario", None) or Scenario()
+    scenario = request_of(Scenario() if (given := settings.pop("scenario", None)) is None else given)
     if not isinstance(scenario, Scenario):
-        raise UsageError(f"scenario = {shown(repr(scenario))}: expected a Scenario")
+        raise UsageError(f"scenario = {shown(repr(given))}: expected a Scenario, no other system")
     flight = {
         "request": _fastest(scenario),
         "reward": nearness,

@@ -1,5 +1,6 @@
 """Writes the report of runs, a study or a comparison."""
 
+import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 from orchestration.experiments.report import html, of_runs
 from orchestration.experiments.report.sources import report_of
 from orchestration.experiments.report.subset import Progress, Wanted
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.simulation.runs.result import Result
 
 ENDINGS = (".html", ".htm")
@@ -31,6 +32,11 @@ def report(
     """
     if not what:
         raise UsageError("report: expected runs, a study or a comparison")
+    for each in what:
+        if not isinstance(each, (Result, str, os.PathLike)):
+            raise UsageError(
+                f"report: {shown(repr(each))}: expected a Result, or the path of a run, a study or a store"
+            )
     paths = [Path(each) for each in what if not isinstance(each, Result)]
     results = [each for each in what if isinstance(each, Result)]
     name = f"report_{paths[0].resolve().stem if paths else 'run'}.html"

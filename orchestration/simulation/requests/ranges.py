@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range
@@ -32,6 +33,8 @@ class Varied:
     """`period`, `delay`, `jitter` or `loss` of the quadrotor, or a path"""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.of, str):
+            raise UsageError(f"--of {self.of}: expected the name of a quantity, or a path, as text")
         for path in self.paths:
             value = value_at(self.system, path)
             if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, Distribution))):
@@ -76,6 +79,9 @@ def search_range(
     scan: float | None,
 ) -> Range:
     """The range in which a limit is searched; raises `UsageError` for an invalid one."""
+    for flag, value in (("from", first), ("to", last), ("tolerance", tolerance), ("scan", scan)):
+        if value is not None and not isinstance(value, Real):
+            raise UsageError(f"--{flag} {value}: expected a number")
     for flag, value in (("tolerance", tolerance), ("scan", scan)):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise UsageError(f"--{flag} {value}: expected a positive number")

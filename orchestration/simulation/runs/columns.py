@@ -11,6 +11,7 @@ import numpy as np
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.runs.arguments import values_by_path
 from orchestration.systems.system.check import check_parameter
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
@@ -76,7 +77,7 @@ def columns(request: Request, system: System, models: Mapping[str, Model], value
     `values` has an array for each target that `request` knows. Raises `UsageError` for an unknown target, arrays that
     do not broadcast, and values that the FMUs do not accept.
     """
-    arrays = {target: _array(target, value) for target, value in dict(values).items()}
+    arrays = {target: _array(target, value) for target, value in values_by_path(values, "values =").items()}
     shape = _common_shape(arrays)
     parameters: dict[str, Floats] = {}
     settings: dict[str, Sequence[Any]] = {}
@@ -143,7 +144,7 @@ def _array(target: str, value: Any) -> Any:
 def _real(target: str, column: Any) -> Floats:
     """The values of a Real parameter; raises `UsageError`, naming the run, for one that is no finite number."""
     if column.dtype.kind not in "fiu":
-        raise UsageError(f"values of {target}: {shown(column[0])} is no number; expected numbers")
+        raise UsageError(f"values of {target}: {shown(repr(column[0].item()))} is no number; expected numbers")
     numbers: Floats = np.ascontiguousarray(column, dtype=np.float64)
     wrong = np.flatnonzero(~np.isfinite(numbers))
     if len(wrong):

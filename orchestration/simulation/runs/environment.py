@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.requests.request import RequestLike
+from orchestration.simulation.runs.arguments import function_in, names_in, values_by_path
 from orchestration.simulation.runs.stepped_runs import SteppedRuns
 from orchestration.simulation.runs.stepping import Simulation
 
@@ -49,7 +50,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         """
         self.simulation = Simulation(request, component)
         """The simulation that it steps: names of observations and actions, and the result of a finished episode."""
-        self._reward, self._starts, self._observe = reward, starts, tuple(observe)
+        self._reward, self._starts, self._observe = _chosen(reward, starts, observe)
         self.action_space = _actions(self.simulation.commanded, low, high)
         self.observation_space = _observations(self.simulation.measured, self._observe)
 
@@ -57,7 +58,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         """Begin an episode; `options` are values by path on top of those that `starts` draws."""
         super().reset(seed=seed)
         values, seed_of_episode = _episode(self.np_random, self._starts)
-        return self._with_others(self.simulation.reset(seed_of_episode, {**values, **(options or {})})), {}
+        return self._with_others(self.simulation.reset(seed_of_episode, {**values, **_options(options)})), {}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Go on to the next sample; returns observation, reward, whether terminated or truncated, and `info`."""
@@ -115,7 +116,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
         self.runs = SteppedRuns(request, component, num_envs)
         """The runs that it steps: names of observations and actions."""
         self.num_envs = num_envs
-        self._reward, self._starts, self._observe = reward, starts, tuple(observe)
+        self._reward, self._starts, self._observe = _chosen(reward, starts, observe)
         self.single_action_space = _actions(self.runs.commanded, low, high)
         self.single_observation_space = _observations(self.runs.measured, self._observe)
         batched = gymnasium.vector.utils.batch_space
@@ -130,31 +131,41 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
 
         `options` are values by path on top of those that `starts` draws: one for all, or an array with one for each.
         """
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed or [None] * self.num_envs
+        seeds = self._seeds(seed)
         if not self._random:
             self._random = [seeding.np_random(None)[0] for _ in seeds]
         for i, own in enumerate(seeds):
             if own is not None:
                 self._random[i] = seeding.np_random(own)[0]
-        self._begin(np.arange(self.num_envs), options or {})
+        self._begin(np.arange(self.num_envs), _options(options))
         return self._observation(), {}
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, Booleans, Booleans, dict[str, Any]]:
         """Go on to the next samples; raises `UsageError` for actions that are not finite, and before `reset`."""
         if not self._random:
             raise UsageError("step: no run is under way; expected reset before it")
-        actions = np.asarray(actions, dtype=np.float64)
+        actions = _numbers(actions)
         if actions.shape != self.action_space.shape or not np.isfinite(actions).all():
             raise UsageError(f"actions: expected finite numbers, shape {self.action_space.shape}")
         fresh = self.runs.over.copy()
         self.runs.step(actions)
         if fresh.any():
             self._begin(np.flatnonzero(fresh), {})
-        rewards = np.asarray(self._reward(_Values(self.runs)), dtype=np.float64)
+        value = self._reward(_Values(self.runs))
+        rewards = _numbers(value)
         if rewards.shape != (self.num_envs,):
-            raise UsageError(f"reward: returned shape {rewards.shape}; expected a number for each of {self.num_envs}")
+            raise UsageError(f"reward: returned {shown(repr(value))}; expected an array of {self.num_envs} numbers")
         terminated = self.runs.diverged.copy()
         return self._observation(), np.where(fresh, 0.0, rewards), terminated, self.runs.over & ~terminated, {}
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """The seed of each environment; None: it goes on with its random numbers."""
+        if seed is None or isinstance(seed, int):
+            return [None if seed is None else seed + i for i in range(self.num_envs)]
+        seeds = [*seed] if isinstance(seed, Sequence) else []
+        if len(seeds) != self.num_envs:
+            raise UsageError(f"seed = {shown(repr(seed))}: expected a whole number, or a list of {self.num_envs}")
+        return seeds
 
     def _begin(self, places: Any, options: Mapping[str, Any]) -> None:
         drawn, seeds = zip(*(_episode(self._random[place], self._starts) for place in places.tolist()))
@@ -184,8 +195,30 @@ class _Values(Mapping[str, Any]):
 
 def _episode(random: np.random.Generator, starts: InitialValues | None) -> tuple[Mapping[str, Any], int]:
     """The values that an episode begins with, and its seed."""
-    values = {} if starts is None else dict(starts(random))
+    values = {} if starts is None else values_by_path(starts(random), "starts: returned")
     return values, int(random.integers(2**63 - 1))
+
+
+def _chosen(
+    reward: Reward, starts: InitialValues | None, observe: Sequence[str]
+) -> tuple[Reward, InitialValues | None, tuple[str, ...]]:
+    """What an environment is made with; raises `UsageError` for what is not of its kind."""
+    function_in(reward, "reward", "the values after a step, which returns a number")
+    if starts is not None:
+        function_in(starts, "starts", "a generator of random numbers, which returns values by path")
+    return reward, starts, names_in(observe, "observe")
+
+
+def _options(options: Any) -> dict[str, Any]:
+    return {} if options is None else values_by_path(options, "options =")
+
+
+def _numbers(values: Any) -> Floats:
+    """An array of numbers, empty for what is none."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)
 
 
 def _actions(commanded: Sequence[str], low: Any, high: Any) -> Any:

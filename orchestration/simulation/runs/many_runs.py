@@ -20,6 +20,7 @@ from orchestration.simulation.engines.master import BATCH
 from orchestration.simulation.engines.resolved import check_against_fmus, columns_of, source_signals
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import FIXED, OUTCOME, Metrics
+from orchestration.simulation.runs.arguments import names_in
 from orchestration.simulation.runs.columns import Columns, columns
 from orchestration.simulation.runs.flights import Flights
 from orchestration.simulation.runs.simulation import run
@@ -57,7 +58,7 @@ def fly(
     Raises `UsageError` for a path, an output or a column that does not exist, arrays that do not broadcast, and invalid
     values; and what `run` raises for a run that fails, naming it.
     """
-    loaded = request_of(request)
+    loaded, record = request_of(request), names_in(record, "record")
     with errors_in_own_terms(loaded):
         system = _measured(located(loaded.as_system()), metrics)
         models = {
@@ -66,7 +67,7 @@ def fly(
         check(system, models)
         system = connect_references(system, models)
         fits = check_against_fmus(_recording(system, models, record), models)
-        names = _outputs(fits.system, outputs)
+        names = _outputs(fits.system, None if outputs is None else names_in(outputs, "outputs"))
         runs = columns(loaded, fits.system, models, values)
         reason = _reason_unavailable(fits.system, models, in_process)
         table = _Table(runs, names, record)
@@ -185,6 +186,8 @@ def located(system: System) -> System:
 
 def _measured(system: System, metrics: Mapping[str, str]) -> System:
     """The system with objectives of the caller's own too; raises `UsageError` for what cannot be one."""
+    if not isinstance(metrics, Mapping):
+        raise UsageError(f"metrics = {shown(repr(metrics))}: expected a dictionary of expressions by name")
     taken = [*system.objectives, *system.optional, *FIXED]
     for name, text in metrics.items():
         if name in taken:
@@ -198,8 +201,6 @@ def _measured(system: System, metrics: Mapping[str, str]) -> System:
 
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
     """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
-    if isinstance(record, str):
-        raise UsageError(f"record = {record!r}: expected a list of names")
     known, usual = {"time", *columns_of(system)}, recorded_variables(system, models)
     components = dict(system.components)
     for column in record:
@@ -216,8 +217,6 @@ def _recording(system: System, models: Mapping[str, Model], record: Sequence[str
 
 def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:
     """The names of the results of a run; default: all. Raises `UsageError` for an unknown one."""
-    if isinstance(names, str):
-        raise UsageError(f"outputs = {names!r}: expected a list of names")
     known = [*dict.fromkeys((*system.objectives, *system.optional, *FIXED))]
     for name in names or ():
         if name not in known:

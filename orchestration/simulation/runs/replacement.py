@@ -8,6 +8,7 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.simulation.engines.resolved import ResolvedRequest, check_against_fmus
+from orchestration.simulation.runs.arguments import values_by_path
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -28,8 +29,9 @@ class Replacement:
     commanded: tuple[str, ...]
     """its outputs that are connected"""
 
-    def resolve(self, values: Mapping[str, Any]) -> ResolvedRequest:
-        """Resolve it with other values by target; raises `UsageError` for values that are invalid."""
+    def resolve(self, values: Mapping[str, Any], seed: int | None) -> ResolvedRequest:
+        """Resolve it with other values by target, and a seed; raises `UsageError` for values that are invalid."""
+        values = values_by_path(values, "values =") | ({} if seed is None else {"seed": seed})
         with errors_in_own_terms(self.request):
             paths = {path: value for target, value in values.items() for path in self.request.paths_of(target)}
             system = changed(self.system, paths) if paths else self.system
@@ -63,7 +65,7 @@ def component_named(system: System, component: str | None, to: str) -> str:
             raise UsageError(f"component: expected the one {to}, as {len(sampled)} are sampled; one of {listed}")
         component = sampled[0]
     if component not in system.components:
-        raise UsageError(f"component: {component}: {expected_name(component, list(system.components))}")
+        raise UsageError(f"component: {component}: {expected_name(str(component), list(system.components))}")
     return component
 
 

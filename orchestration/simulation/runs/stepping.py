@@ -71,7 +71,7 @@ class Simulation:
         axes of studies name them. Raises `UsageError` for invalid values, `SimulatorError` if an FMU refuses them.
         """
         self._abandon()
-        self._resolved = self._replacement.resolve({**(values or {}), **({} if seed is None else {"seed": seed})})
+        self._resolved = self._replacement.resolve(values or {}, seed)
         self._reports: SimpleQueue[BaseException | None] = SimpleQueue()
         self._replies: SimpleQueue[bool] = SimpleQueue()
         self._outcome, self._result, self._run = None, None, None

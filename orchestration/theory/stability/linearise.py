@@ -46,6 +46,9 @@ class Linearised:
     rest: StateSpace
     """The rest of the loop, from sample to sample: inputs are the commands, outputs the measurements at the next
     sample, with holds, delays and the other components in between."""
+    operating_point: dict[str, float]
+    """The values about which it is linear, by COMPONENT.VARIABLE: of all columns of a run, and of the component's
+    inputs."""
     radius: float
     """The spectral radius of the whole loop, closed, over a period, with what its halves leave out: below 1 small
     deviations decay."""
@@ -101,12 +104,15 @@ def cut_open(loop: AtRest, name: str) -> Linearised:
     """A loop at rest, cut open at a sampled component; raises `UsageError` for one that is not the slowest."""
     sampling = loop.simulation.system.components[name].sampling
     assert sampling is not None
-    rest = rest_of_loop(loop, name)
+    rest, board, at_samples = rest_of_loop(loop, name), loop.simulation.master.board, loop.rest_of(name)
+    point = {column: float(board.row[place]) for column, place in board.place.items() if column != "time"}
+    point |= {f"{name}.{end}": value for end, value in zip(at_samples.inputs, at_samples.held.tolist())}
     whole = period_map(loop)
     return Linearised(
         name=name,
         component=StateSpace(**vars(of_samples(loop.tangents[name], sampling.period)), dt=rest.dt),
         rest=rest,
+        operating_point=point,
         radius=float(np.abs(np.linalg.eigvals(whole)).max(initial=0.0)),
         poles=as_poles(poles_of(whole), rest.dt),
     )

@@ -79,6 +79,26 @@ def test_bounds_that_are_none_are_refused(low: Any, high: Any) -> None:
         gym.Environment(SHORT, reward, low=low, high=high)
 
 
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"reward": 3}, r"^reward = 3: expected a function of the values after a step, which returns a number$"),
+        (
+            {"starts": {X: 1.0}},
+            r"^starts = \{.*\}: expected a function of a generator of random numbers, which returns",
+        ),
+        ({"starts": lambda random: 3}, r"^starts: returned 3: expected a dictionary of values by path"),
+        ({"observe": "time"}, r"^observe = 'time': expected a list of names$"),
+    ],
+    ids=["reward", "starts", "what starts returns", "observe"],
+)
+def test_what_an_environment_cannot_be_made_with_is_refused_in_a_line(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        gymnasium.make("quadcosim/Quadrotor-v0", scenario=SHORT, **settings).reset()
+    with pytest.raises(UsageError, match=r"^options = 3: expected a dictionary of values by path"):
+        gym.Environment(SHORT, reward, low=LOW, high=HIGH).reset(options=3)
+
+
 def test_without_gymnasium_one_line_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     for name in ("quadcosim.gym", "orchestration.simulation.runs.environment"):
@@ -177,13 +197,15 @@ def test_what_cannot_be_is_refused_in_a_line_in_lanes_too() -> None:
     with pytest.raises(UsageError, match=r"^step: no run is under way; expected reset before it$"):
         many.step(np.zeros((2, 4)))
     many.reset(seed=0)
-    for wrong in (np.zeros(4), np.full((2, 4), np.nan)):
+    for wrong in (np.zeros(4), np.full((2, 4), np.nan), "level"):
         with pytest.raises(UsageError, match=r"^actions: expected finite numbers, shape \(2, 4\)$"):
             many.step(wrong)
-    with pytest.raises(UsageError, match=r"^reward: returned shape \(\); expected a number for each of 2$"):
+    with pytest.raises(UsageError, match=r"^reward: returned 1.0; expected an array of 2 numbers$"):
         many.step(np.zeros((2, 4)))
-    with pytest.raises(UsageError, match=r"^scenario = 'paper': expected a Scenario$"):
-        gymnasium.make("quadcosim/Quadrotor-v0", scenario="paper")
+    with pytest.raises(UsageError, match=r"^seed = \[1\]: expected a whole number, or a list of 2$"):
+        many.reset(seed=[1])
+    with pytest.raises(UsageError, match=r"^paper.toml: expected a readable system or scenario file"):
+        gymnasium.make("quadcosim/Quadrotor-v0", scenario="paper.toml")
     with pytest.raises(UsageError, match=r"^there is no plant.mas"):
         many.runs.value("plant.mas")
     with pytest.raises(UsageError, match=r"plant.initial.position.w: QuadrotorPlant has no such variable"):

@@ -155,7 +155,7 @@ def test_foreign_fmus_are_flown_alone_and_named(tmp_path: Path) -> None:
     assert "components.one: small.fmu" in str(quadcosim.fly(system, {"stop_time": [0.1]}, in_process=True).reason)
 
 
-WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+WRONG: list[tuple[Any, dict[str, Any], str]] = [
     ({"plant.initial.position.w": [0.0]}, {}, r"plant.initial.position.w: QuadrotorPlant has no such variable"),
     ({"plan.mass": [1.0]}, {}, r"plan.mass: expected controller.NAME, plant.NAME"),
     ({"timing.perod": [0.1]}, {}, r"timing.perod: expected .*timing.KEY with KEY one of period"),
@@ -165,13 +165,17 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
         rf"^values of {Y}: shape \(3,\); expected one that broadcasts with \(2,\), that of",
     ),
     ({X: [0.0, float("nan")]}, {}, rf"^values of {X}: nan in run 1; expected finite numbers$"),
-    ({X: ["far"]}, {}, rf"^values of {X}: far is no number; expected numbers$"),
+    ({X: ["far"]}, {}, rf"^values of {X}: .far. is no number; expected numbers$"),
     (
         {X: [[0.0], [1.0, 2.0]]},
         {},
         rf"^values of {X}: expected an array of numbers, truth values or words, with one at",
     ),
     ({X: []}, {}, rf"^values of {X}: expected an array of numbers"),
+    ([1, 2], {}, r"^values = \[1, 2\]: expected a dictionary of values by path, as \{'seed': 1\}$"),
+    ({3: [1.0]}, {}, r"^values = \{3: \[1.0\]\}: expected paths as text, not 3$"),
+    ({X: [0.0]}, {"metrics": 3}, r"^metrics = 3: expected a dictionary of expressions by name$"),
+    ({X: [0.0]}, {"record": 3}, r"^record = 3: expected a list of names$"),
     ({"seed": [0, -1]}, {}, r"^seed = -1: expected a whole number from 0 to 2\^63 - 1$"),
     ({"seed": [0.5]}, {}, r"^seed = 0.5: expected a whole number"),
     (
@@ -202,7 +206,7 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
 def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[str, Any], message: str) -> None:
     still = {f"plant.initial.quaternion.{axis}": 0.0 for axis in "xyz"}
     with pytest.raises(QuadcosimError, match=message) as error:
-        quadcosim.fly(SHORT, values | (still if "quaternion" in str(values) else {}), **more)
+        quadcosim.fly(SHORT, values | still if "quaternion" in str(values) else values, **more)
     assert "\n" not in str(error.value)
 
 

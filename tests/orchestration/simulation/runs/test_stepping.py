@@ -142,8 +142,9 @@ def test_a_command_that_is_none_is_refused_and_the_run_goes_on(command: Any, mes
 
 
 def test_steps_without_a_run_and_components_that_are_none_are_refused() -> None:
-    with pytest.raises(UsageError, match=r"^component: wing: expected one of plant, controller$"):
-        Simulation(SHORT, "wing")
+    for wrong in ("wing", 3):
+        with pytest.raises(UsageError, match=rf"^component: {wrong}: expected one of plant, controller$"):
+            Simulation(SHORT, wrong)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"^timing.clock = fmu: expected master: your code has no clock$"):
         Simulation(SHORT.with_changes(timing={"clock": "fmu"}))
     with Simulation(SHORT) as simulation:

@@ -87,12 +87,16 @@ def test_the_servo_closed_again_has_the_spectral_radius_of_theory() -> None:
 
 def test_a_vehicle_that_hovers_has_twelve_states_however_fast_it_is_sampled() -> None:
     """A torque about y tilts, and so accelerates by g: x is -g h t³/(6 J) long after a sample of it."""
-    rest = linearise(native(timing=Timing(period=0.002))).rest
+    loop = linearise(native(timing=Timing(period=0.002)))
+    rest, point = loop.rest, loop.operating_point
     moved = responses(rest, 500)[-1, rest.outputs.index("position.x"), rest.inputs.index("torque.y")]
     middle = 1.0 - 0.001  # of the push
     inertia = quadcosim.read_model("fmus/QuadrotorPlant.fmu").variables["inertia.yy"].start
     assert inertia is not None
     assert len(rest.A) == 12
+    assert point["plant.thrust"] == point["controller.thrust"] == pytest.approx(9.81)
+    ends = {f"controller.{name}": float(name == "quaternion.w") for name in rest.outputs}
+    assert {end: point[end] for end in ends} == pytest.approx(ends)
     assert moved == pytest.approx(-9.81 * 0.002 * middle**3 / (6.0 * float(inertia)), rel=1e-5)
 
 
