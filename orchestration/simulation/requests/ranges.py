@@ -9,6 +9,8 @@ from numbers import Real
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.basics.unit_algebra import after
 from orchestration.simulation.results.quantities import is_in_seconds
 from orchestration.systems.system.component import TaskSampling
@@ -85,13 +87,16 @@ def search_range(
     for flag, value in (("tolerance", tolerance), ("scan", scan)):
         if value is not None and not (value > 0.0 and math.isfinite(value)):
             raise UsageError(f"--{flag} {value}: expected a positive number")
-    known = varied.request.range_of(varied.of) or _range_of_period(varied)
+    named = varied.request.range_of(varied.of)
+    known = named or _range_by_period(varied)
     if known is None and (first is None or last is None):
         raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is searched")
     low = first if first is not None else known.first if known is not None else 0.0
     high = last if last is not None else known.last if known is not None else 0.0
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
+    if known is not None and named is None and (first is None or last is None):
+        inform(f"--of {varied.of}: searched from {low:g} to {high:g}{known.unit}; --from and --to set others")
     step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
     return Range(
         before=known.before if known is not None and first is None else (),
@@ -120,13 +125,32 @@ def default_quantity(request: Request) -> str:
     return paths[0]
 
 
-def _range_of_period(varied: Varied) -> Range | None:
-    """From half to fifty times the period of a sampled component, as for the quadrotor."""
-    is_task = varied.of.startswith("computers.") and varied.of.endswith(f".{PERIOD}")
-    if not (is_task or varied.of.endswith(f".sampling.{PERIOD}")):
+def _range_by_period(varied: Varied) -> Range | None:
+    """The range of a period, jitter, delay or loss in a system, in periods as for the quadrotor; None: of others."""
+    owner, _, name = varied.of.rpartition(".")
+    is_task = owner.startswith("computers.")
+    if name == PERIOD and (is_task or owner.endswith(".sampling")):
+        period = float(value_at(varied.system, varied.of))
+        return Range(first=period / 2.0, step=period / 2.0, last=50.0 * period, tolerance=period / 20.0)
+    if name == "jitter" and owner.endswith(".sampling"):
+        period = float(value_at(varied.system, f"{owner}.{PERIOD}"))
+        return Range(first=0.0, step=period / 10.0, last=0.999 * period, tolerance=period / 100.0)
+    ends = [x for x in varied.system.connections if owner == f"connections.{x.name}"]
+    if name == "loss" and ends:
+        length = ends[0].burst_length
+        return Range(
+            first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit=""
+        )
+    periods = [
+        float(sampling.true_period) / NANOSECONDS
+        for x in ends
+        for end in (x.sender, x.receiver)
+        if (sampling := varied.system.components[end].sampling) is not None
+    ]
+    if name not in ("delay", "delay_jitter") or not periods or max(periods) == 0.0:
         return None
-    period = float(value_at(varied.system, varied.of))
-    return Range(first=period / 2.0, step=period / 2.0, last=50.0 * period, tolerance=period / 20.0)
+    most, period = 50.0 if name == "delay" else 10.0, max(periods)
+    return Range(first=0.0, step=period / 2.0, last=most * period, tolerance=period / 20.0)
 
 
 def unit_at(path: str, models: Mapping[str, Model]) -> str | None:

@@ -91,6 +91,7 @@ class AtRest:
             is_alike = before == component and period >= self.period >= FINEST * period
             if is_alike and (again := known.about(self.rest_of(name))) is not None:
                 return again
+            self.simulation.instances[name].restore(self.saved_states[name])  # the attempt has moved it
         found = _tangent(self, name, self.factor)
         self.known[name] = component, self.period, found
         return found

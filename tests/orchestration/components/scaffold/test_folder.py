@@ -21,7 +21,7 @@ from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.linearise import linearise
-from orchestration.theory.stability.local_limit import local_limits
+from orchestration.theory.stability.local_limit import LOOP, local_limits
 from quadcosim import bode, expect, margin
 from tests.commands import Main
 from tests.extent import in_test_all, sample
@@ -115,6 +115,9 @@ def _expect_linear_theory(system: System) -> None:
     control = pytest.importorskip("control")
     (margins,) = bode(system).loops
     assert margins.gain_margin == pytest.approx(0.5 * 9.81 * 0.4 / 4.0, rel=1e-3), "k_p is m g l there"
+    delays = Varied(request=system, of="connections.command.delay")
+    late = local_limits(delays, Range(first=0.06, step=0.03, last=0.12, tolerance=5e-4))
+    assert (late.limit, late.method) == (pytest.approx(margins.delay_margin, rel=1e-4), LOOP)
     loop = linearise(system)
     gain, _, poles = control.dlqr(loop.rest.to_control(), np.eye(2), np.eye(1))
     assert gain.shape == (1, 2)

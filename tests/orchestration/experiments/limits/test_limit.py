@@ -30,13 +30,14 @@ from orchestration.quadrotor.flight.hover_limit import local_limit
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.scenarios.wiring import COMMAND
-from orchestration.simulation.requests.ranges import Varied
+from orchestration.simulation.requests.ranges import Varied, search_range
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
 from quadcosim import Result, Scenario, Timing, UsageError
+from tests.examples.common import example
 from tests.extent import sample
 from tests.fmus import source_tree
 from tests.native import NATIVE
@@ -94,6 +95,25 @@ def test_with_islands_of_failure_the_bracket_is_a_true_one_below_the_first_value
     assert bad - good <= 1e-3
     assert fails(bad)
     assert not fails(good)
+
+
+@pytest.mark.parametrize(
+    ("of", "first", "step", "last"),
+    [
+        ("connections.command.delay", 0.0, 0.003, 0.3),
+        ("connections.command.delay_jitter", 0.0, 0.003, 0.06),
+        ("connections.command.loss", 0.0, 0.05, 1.0),
+        ("components.controller.sampling.jitter", 0.0, 0.0006, 0.005994),
+        ("components.controller.sampling.period", 0.003, 0.003, 0.3),
+    ],
+)
+def test_times_of_a_system_are_searched_in_units_of_the_period_unless_told_otherwise(
+    of: str, first: float, step: float, last: float
+) -> None:
+    varied = Varied(request=example("dc_servo"), of=of)
+    span = search_range(varied, {}, first=None, last=None, tolerance=None, scan=None)
+    assert (span.first, span.step, span.last) == pytest.approx((first, step, last))
+    assert search_range(varied, {}, first=0.001, last=None, tolerance=None, scan=None).first == 0.001
 
 
 def test_an_island_of_failure_within_the_bracket_is_seen_by_the_finer_steps() -> None:
