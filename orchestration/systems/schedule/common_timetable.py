@@ -1,10 +1,9 @@
 """Spans of a timetable: regular instants, which no seed changes and many runs share, and those of a single run."""
 
-from collections import OrderedDict
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
-from orchestration.foundation.basics.times import Grid, exact_nanoseconds, nanoseconds
+from orchestration.foundation.basics.times import Grid, clock_grid, exact_nanoseconds, nanoseconds
 from orchestration.systems.schedule.fixed_step import FixedStep, in_seconds
 from orchestration.systems.schedule.instant_arrays import Schedule
 from orchestration.systems.schedule.plan import Plan, expect_no_longer
@@ -170,8 +169,10 @@ def _begins(instants: Integers, count: int) -> Integers:
     return np.repeat(np.arange(len(instants) + 1), np.diff(ends))
 
 
-_KEPT = 8
+_KEPT = 32
 """Spans whose regular instants are cached"""
+_Points = tuple[tuple[Fraction, tuple[int, ...]], ...]
+"""Distances of points [ns], and the components in continuous time, by their places, that are stepped to them"""
 
 
 class CommonTimetable:
@@ -205,14 +206,31 @@ class CommonTimetable:
         """the components at the ends of the connections"""
         self.mean_interval = _mean_interval(system)
         """the approximate mean time between instants [ns]"""
-        self._changes = [
-            (Grid(Fraction(0), exact_nanoseconds(source.period)), [names.index(end.split(".")[0]) for end in source.to])
+        self._steps: _Points = tuple(
+            (exact_nanoseconds(system.components[names[i]].step or 0.0), (int(self.place[i]),)) for i in self.points
+        )
+        self._changes: _Points = tuple(
+            (
+                exact_nanoseconds(source.period),
+                tuple(int(self.place[names.index(end.split(".")[0])]) for end in source.to),
+            )
             for source in system.sources.values()
             if source.period is not None
-        ]
+        )
         self.outlines: dict[Hashable, object] = {}
         """Outlines for C, by the numbers of streams"""
-        self._kept: OrderedDict[tuple[int, int], Instants] = OrderedDict()
+
+    @cached_property
+    def grids(self) -> dict[str, Grid]:
+        """The grids of all components by name: of points in continuous time, or of samples."""
+        components = self.system.components
+        names = [*components]
+        grids = {names[i]: grid for i, grid in self.points.items()}
+        for name, component in components.items():
+            if component.sampling is not None:
+                sampling = component.sampling
+                grids[name] = clock_grid(sampling.offset, sampling.period, sampling.clock_ratio)
+        return grids
 
     @cached_property
     def resources(self) -> "Resources":
@@ -231,23 +249,24 @@ class CommonTimetable:
 
     def regular(self, begin: int, end: int) -> Instants:
         """The regular instants from `begin` to before `end` [ns]: points, changes of sources, the start and the end."""
-        if (begin, end) in self._kept:
-            self._kept.move_to_end((begin, end))
-            return self._kept[begin, end]
-        found = InstantCollector(len(self.continuous))
-        for component, grid in self.points.items():
-            found.add(grid.between(grid.index_from(begin), grid.index_from(end)), int(self.place[component]))
-        if begin == 0:
-            found.add(np.zeros(1, dtype=np.int64))
-        for grid, receivers in self._changes:  # the value at the start is that of initialisation
-            times = grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1))
-            found.add(times, *self.place[receivers].tolist())
-        if end > self.stop:
-            found.add(np.full(1, self.stop), *range(len(self.continuous)))
-        self._kept[begin, end] = instants = found.instants()
-        while len(self._kept) > _KEPT:
-            self._kept.popitem(last=False)
-        return instants
+        return _regular(self._steps, self._changes, self.stop, begin, end)
+
+
+@lru_cache(_KEPT)
+def _regular(steps: _Points, changes: _Points, stop: int, begin: int, end: int) -> Instants:
+    """The regular instants of all systems with these steps and changes of sources: they do not follow from samples."""
+    found = InstantCollector(len(steps))
+    for distance, places in steps:
+        grid = Grid(Fraction(0), distance)
+        found.add(grid.between(grid.index_from(begin), grid.index_from(end)), *places)
+    if begin == 0:
+        found.add(np.zeros(1, dtype=np.int64))
+    for distance, places in changes:  # the value at the start is that of initialisation
+        grid = Grid(Fraction(0), distance)
+        found.add(grid.between(max(grid.index_from(begin), 1), max(grid.index_from(end), 1)), *places)
+    if end > stop:
+        found.add(np.full(1, stop), *range(len(steps)))
+    return found.instants()
 
 
 def _expect_moves(system: System, fixed: Mapping[str, FixedStep]) -> None:

@@ -17,7 +17,7 @@ from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.libraries import cached_library
 from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError
-from orchestration.foundation.basics.times import Grid, clock_grid, nanoseconds
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Instants, Span
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.instant_arrays import Schedule
@@ -96,7 +96,7 @@ def _reason(common: CommonTimetable) -> str | None:
         return f"components.{next(iter(common.fixed))} takes steps of one length only"
     if len(common.continuous) > _MOST_CONTINUOUS:
         return f"more than {_MOST_CONTINUOUS} components are in continuous time"
-    for name, grid in _grids(common).items():
+    for name, grid in common.grids.items():
         if grid.in_parts() is None:
             return f"components.{name}: its instants are no fractions of a nanosecond that fit into 62 bits"
     try:
@@ -104,16 +104,6 @@ def _reason(common: CommonTimetable) -> str | None:
     except QuadcosimError as error:
         return str(error)
     return None
-
-
-def _grids(common: CommonTimetable) -> dict[str, Grid]:
-    names = [*common.system.components]
-    grids = {names[i]: grid for i, grid in common.points.items()}
-    for name, component in common.system.components.items():
-        if component.sampling is not None:
-            sampling = component.sampling
-            grids[name] = clock_grid(sampling.offset, sampling.period, sampling.clock_ratio)
-    return grids
 
 
 class CompiledTimetable(Timetable):
@@ -192,7 +182,6 @@ class _Outline:
     def __init__(self, common: CommonTimetable, streams: Streams) -> None:
         self._c, self._common, self._streams, self._kept = _structures(), common, streams, list[Any]()
         plan, connections, sender = common.plan, common.system.connections, common.sender
-        self._grids = _grids(common)
         routes = [self._route(i, x) for i, x in enumerate(connections)]
         clocks = [self._clock(name) for name in plan.sampled]
         names = [*common.system.components]
@@ -226,10 +215,11 @@ class _Outline:
         assert sampling is not None
         incoming = [i for i in common.plan.measured if connections[i].receiver == name]
         outgoing = [i for i in common.plan.commanded if connections[i].sender == name]
-        longest = [nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter)) for x in connections]
+        late = (connections[i] for i in incoming)
+        longest = (nanoseconds(highest(x.delay)) + nanoseconds(highest(x.delay_jitter)) for x in late)
         return self._c.Clock(
             component=[*common.system.components].index(name),
-            ahead=max((longest[i] for i in incoming), default=0), grid=self._grid(name),
+            ahead=max(longest, default=0), grid=self._grid(name),
             late=self._lateness(
                 sampling.jitter, sampling.jitter_distribution, self._streams.key(f"components.{name}", JITTER)
             ),
@@ -238,7 +228,7 @@ class _Outline:
         )  # fmt: skip
 
     def _grid(self, name: str) -> Any:
-        parts = self._grids[name].in_parts()
+        parts = self._common.grids[name].in_parts()
         assert parts is not None
         return self._c.Grid(*parts)
 

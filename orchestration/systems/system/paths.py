@@ -260,6 +260,8 @@ def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Com
     rest = {key: value for key, value in _by_parameter(component, keys).items() if "." not in key}
     if sampling:
         rest["sampling"] = _replaced(f"{place}.sampling", component.sampling, sampling)
+    if rest.keys() == {"sampling"} and "fmu_clock" not in sampling:  # nothing else in a component depends on it
+        return replaced(component, **rest)
     return _replaced(place, component, rest) if rest else component
 
 

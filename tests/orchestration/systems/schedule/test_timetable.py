@@ -7,6 +7,7 @@ import pytest
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.systems.schedule import instant_arrays
+from orchestration.systems.schedule.common_timetable import CommonTimetable
 from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.plan import MAX_TIME
@@ -37,6 +38,19 @@ def test_instants_are_points_samples_arrivals_and_the_end():
     assert [i.time // MS for i in found] == [0, 30, 100, 200, 250, 280, 300, 400, 500]
     assert [i.time // MS for i in found if i.samples] == [0, 250]  # none at the end
     assert [i.time // MS for i in found if i.arrivals] == [30, 280]
+
+
+def test_systems_that_differ_in_samples_only_share_their_regular_instants():
+    one, other, finer = (
+        CommonTimetable(changed(loop(sampled(0.25), stop_time=0.5), {path: value}), {}).regular(0, 200 * MS)
+        for path, value in (
+            ("components.controller.sampling.period", 0.2),
+            ("connections.command.delay", 0.03),
+            ("components.plant.step", 0.05),
+        )
+    )
+    assert one is other
+    assert (len(one), len(finer)) == (2, 4)
 
 
 def test_a_component_is_stepped_only_to_its_own_events():
