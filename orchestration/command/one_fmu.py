@@ -1,20 +1,23 @@
 """The flags of a run of one FMU."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from orchestration.command.flags import FlightFlags, assigned
 from orchestration.command.options import option
 from orchestration.command.registry import expect_positive
-from orchestration.components.fmi.access import INTERFACES, SCHEDULED, Interface
+from orchestration.components.fmi.access import INTERFACES, SCHEDULED, SOLVERS
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.terminal import inform
 
 if TYPE_CHECKING:
     from orchestration.simulation.runs.result import Result
     from orchestration.systems.system.model import System
+
+Choice = TypeVar("Choice", bound=str)
 
 _of_fmu = partial(option, panel="One FMU")
 _ALONE = tuple(name for name in INTERFACES if name != SCHEDULED)
@@ -34,6 +37,9 @@ class OneFmuFlags:
         float | None, _of_fmu("--output-interval", "Distance of rows, and communication step.", "SECONDS")
     ] = None
     tolerance: Annotated[float | None, _of_fmu("--tolerance", "Relative tolerance of its solver.", "R")] = None
+    solver: Annotated[
+        str | None, _of_fmu("--solver", "By model exchange; default: dormand-prince.", "|".join(SOLVERS))
+    ] = None
     record: Annotated[
         list[str] | None, _of_fmu("--record", "A variable to write; may be repeated; default: all outputs.", "NAME")
     ] = None
@@ -56,20 +62,16 @@ class OneFmuFlags:
         """The FMU at `path` alone, with these flags and those of any system; `--set` has the names of the FMU."""
         from orchestration.simulation.requests.one_fmu import alone, remarks
 
+        solver = _chosen("solver", self.solver, SOLVERS)
+        interface = _chosen("interface", self.interface, _ALONE) or ("model-exchange" if solver else None)
         system = alone(
             path, start_time=self.start_time, stop_time=flags.stop_time, interval=self.output_interval,
             tolerance=self.tolerance, inputs=self.inputs, record=self.record or (),
-            parameters=assigned("set", flags.set), interface=self._interface(),
+            parameters=assigned("set", flags.set), interface=interface, solver=solver,
         )  # fmt: skip
-        for remark in remarks(system):
+        for remark in remarks(system, is_default_end=flags.stop_time is None):
             inform(remark)
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
-
-    def _interface(self) -> Interface | None:
-        known = {name: name for name in _ALONE}
-        if self.interface is not None and self.interface not in known:
-            raise UsageError(f"--interface {self.interface}: {expected_name(self.interface, list(known))}")
-        return None if self.interface is None else known[self.interface]
 
     def write(self, path: Path, result: "Result") -> None:
         """Write the file of `--output`, of a run of the FMU at `path`."""
@@ -81,3 +83,13 @@ class OneFmuFlags:
             model, (component,) = read_model(path), result.system.components.values()
             chosen = (component.record or ()) if self.record else outputs(model)
             fmpy_table.write(result, model, chosen, self.output)
+
+
+def _chosen(flag: str, name: str | None, known: Sequence[Choice]) -> Choice | None:
+    """One of the names that a flag takes; raises `UsageError` for another one."""
+    if name is None:
+        return None
+    for each in known:
+        if each == name:
+            return each
+    raise UsageError(f"--{flag} {name}: {expected_name(name, list(known))}")

@@ -11,6 +11,7 @@ Interface = Literal["co-simulation", "event-mode", "model-exchange", "scheduled-
 SCHEDULED: Interface = "scheduled-execution"
 Solver = Literal["dormand-prince", "cvode"]
 INTERFACES: tuple[Interface, ...] = get_args(Interface)
+SOLVERS: tuple[Solver, ...] = get_args(Solver)
 
 
 @passable

@@ -25,7 +25,8 @@ class Board:
         self.outputs: dict[str, tuple[str, ...]] = {}
         """the outputs that are read of each component"""
         self.connected: dict[str, int] = {}
-        """the number of its outputs that are connected; these are the first"""
+        """the number of its outputs that are connected, and so have to be finite; these are the first. Where nothing is
+        connected all are looked at, and have to be."""
         columns = ["time"]
         for name, component in system.components.items():
             inputs = [end for x in system.connections for end in x.end if component_of(end) == name]
@@ -34,7 +35,8 @@ class Board:
             outputs = tuple(dict.fromkeys((*connected, *recorded[name])))
             shown = {variable_of(end) for end in inputs} if component.sampling is None else set()
             outputs = tuple(output for output in outputs if output not in shown)
-            self.outputs[name], self.connected[name] = outputs, len(connected)
+            self.outputs[name] = outputs
+            self.connected[name] = len(connected if system.connections else outputs)
             columns += [*(inputs if component.sampling is None else ()), *(f"{name}.{output}" for output in outputs)]
         self.columns = tuple(columns)
         self.row: Floats = np.zeros(len(columns))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fmpy.util import auto_interval
 
-from orchestration.components.fmi.access import Access, Interface
+from orchestration.components.fmi.access import Access, Interface, Solver
 from orchestration.components.fmi.read_description import Model, called, read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
 from orchestration.systems.signals.table_file import TIME, header_of, read_rows
@@ -16,6 +16,8 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import component_names, experiment
 from orchestration.systems.system.source import Source
 
+LONG = 1e4
+"""Default end [s] from which a run may take long"""
 MOST_ROWS = 1000
 """Rows above which the interval of the FMU is doubled, as fmpy does"""
 
@@ -31,6 +33,7 @@ def alone(
     record: Sequence[str] = (),
     parameters: Mapping[str, Parameter] | None = None,
     interface: Interface | None = None,
+    solver: Solver | None = None,
 ) -> System:
     """The FMU at `path` as the only component, in continuous time; what is not given follows its default experiment.
 
@@ -40,7 +43,7 @@ def alone(
     """
     model = read_model(path)
     with prefixed(f"{path}: "):
-        model = called(model, Access(interface=interface))
+        model = called(model, Access(interface=interface, solver=solver))
     begin = (_time(model, "startTime") or 0.0) if start_time is None else start_time
     stop = _time(model, "stopTime") if stop_time is None else stop_time
     end = 1.0 if stop is None else float(Decimal(repr(stop)) - Decimal(repr(begin)))
@@ -57,6 +60,7 @@ def alone(
         record=_recorded(model, record),
         parameters=dict(parameters or {}),
         interface=interface,
+        solver=solver,
         start_time=begin or None,
     )
     sources = {} if inputs is None else _sources(model, name, inputs, begin)
@@ -70,9 +74,15 @@ def outputs(model: Model) -> list[str]:
     return list(model.names("output")) or states[:5]
 
 
-def remarks(system: System) -> Iterator[str]:
+def remarks(system: System, *, is_default_end: bool) -> Iterator[str]:
     """What a run of one FMU does with times that the user may expect otherwise."""
     (component,) = system.components.values()
+    if is_default_end and system.stop_time >= LONG and component.step is not None:
+        steps = math.ceil(system.stop_time / component.step - 1e-9)
+        yield (
+            f"runs for {system.stop_time:g} s, as {component.fmu} declares, in {steps} steps of {component.step:g} s; "
+            "--stop-time T ends sooner, --solver cvode is for stiff models by model exchange"
+        )
     begin = component.start_time or 0.0
     if begin:
         yield f"its time begins at {begin:g} s, where that of the run is 0"

@@ -8,6 +8,7 @@ import pytest
 from fmpy.util import read_csv, write_csv
 
 from orchestration.simulation.engines.batch.shape import Shape
+from orchestration.simulation.requests.one_fmu import remarks
 from orchestration.simulation.requests.request import load_request
 from quadcosim import UsageError, run
 from tests.commands import Main
@@ -72,6 +73,15 @@ def test_without_an_experiment_it_is_one_second_in_the_steps_of_fmpy(here: Path)
 
 
 @needs_compiler
+def test_a_default_end_that_is_long_is_said_with_its_steps(here: Path) -> None:
+    system = load_request(small(here, fmi=3, tolerance='1e-6" stopTime="1e8')).as_system()  # type: ignore[arg-type]
+    (remark,) = remarks(system, is_default_end=True)
+    assert remark.startswith("runs for 1e+08 s, as ")
+    assert "declares, in 500 steps of 200000 s; --stop-time T ends sooner" in remark
+    assert not [*remarks(system, is_default_end=False)]
+
+
+@needs_compiler
 def test_flags_of_one_fmu_are_refused_for_a_system_and_those_of_a_loop_for_one(main: Main, here: Path) -> None:
     assert "--output-interval: for one FMU only" in main("run", "--output-interval", "0.1", code=2).stderr
     assert "--delay: for the quadrotor only" in main("run", small(here), "--delay", "0.1", code=2).stderr
@@ -96,6 +106,11 @@ def test_a_model_of_differential_equations_is_solved_as_near_to_fmpy_as_is_asked
     one, other = (read_csv(name) for name in ("out.csv", "by_fmpy.csv"))
     for name in ("time", "x1", "x2"):
         assert one[name] == pytest.approx(other[name], abs=1e-6)
+    main("run", fmu, "--in-process", "--solver", "cvode", "--output", "cvode.csv", *flags, *chosen)
+    by_cvode = read_csv("cvode.csv")
+    assert by_cvode["x1"] == pytest.approx(one["x1"], abs=1e-6)
+    assert by_cvode["x1"].tolist() != one["x1"].tolist()
+    assert "--solver rk4: expected one of dormand-prince" in main("run", fmu, "--solver", "rk4", code=2).stderr
     refused = main("run", fmu, "--interface", "co-simulation", code=2).stderr
     assert "interface = co-simulation: Oscillator does not offer it; expected model-exchange" in refused
 

@@ -99,6 +99,12 @@ def test_events_name_the_connection():
     ]  # fmt: skip
 
 
+def test_a_value_that_is_not_finite_ends_a_run_in_which_nothing_is_connected():
+    plant = Stub(lambda v, t, h: v.update(y=math.nan if t > 0.25 else 0.0), y=0.0)
+    master = run(system({"plant": continuous(0.1)}, [], stop_time=1.0), {"plant": plant})
+    assert master.divergence == "plant.y = nan at t = 0.4 s, expected a finite value"
+
+
 def test_a_value_that_is_not_finite_is_passed_on_to_nobody():
     what = system(
         {"plant": continuous(0.1), "controller": sampled(0.1)}, [wire("plant.y", "controller.x")], stop_time=1.0
