@@ -8,8 +8,35 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fmu_kit import write_description
-from fmu_kit.compiler.emit import description_3, terminals
+from fmu_kit.compiler.emit import description_3
 from fmu_kit.compiler.emit.sampling_clock import samples
+
+TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+"""Path in an FMU of what says which variables are connected together"""
+
+
+def terminals_xml(slave: Any) -> Element | None:
+    """The terminals of a `Slave` class; None if it has none.
+
+    Two terminals of one name are connected by the names of their variables (matching rule plug).
+    """
+    names = dict.fromkeys(v.terminal for v in slave.variables if v.terminal is not None)
+    if not names:
+        return None
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    listed = SubElement(root, "Terminals")
+    for name in names:
+        terminal = SubElement(listed, "Terminal", name=name, matchingRule="plug")
+        for variable in slave.variables:
+            if variable.terminal == name:
+                SubElement(
+                    terminal,
+                    "TerminalMemberVariable",
+                    variableName=variable.name,
+                    memberName=variable.name,
+                    variableKind="signal",
+                )
+    return root
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +69,7 @@ def _build_description(model: str, main: str) -> Element:
 def _beside_3(slave: Any, main: str) -> dict[str, bytes]:
     found = {
         "sources/buildDescription.xml": _build_description(slave.__name__, main),
-        terminals.TERMINALS: terminals.to_xml(slave),
+        TERMINALS: terminals_xml(slave),
     }
     return {
         path: tostring(root, encoding="UTF-8", xml_declaration=True) for path, root in found.items() if root is not None

@@ -6,15 +6,24 @@ by a twin: the same run in lanes with each Real parameter of its FMUs changed in
 changed, since 0.0 may switch off an effect. A run whose metrics do not change is compared.
 """
 
+import contextlib
+import dataclasses
+import hashlib
+import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+from fmu_kit.libraries import compiler, processor
+from fmu_kit.new_files import write_atomically
 from orchestration.components.building.fmus import look_up, python_twin, python_twins
 from orchestration.components.fmi.read_description import Model, Variable
-from orchestration.experiments.studies import kept_agreement
-from orchestration.simulation.workers.batching import TOLERATED, LaneAgreement, Pair, Repeated, Sample
+from orchestration.simulation.engines.batch.shape import outline
+from orchestration.simulation.workers.batching import SAMPLE, TOLERATED, LaneAgreement, Pair, Repeated, Sample
 from orchestration.simulation.workers.executors import TaskRunner
+from orchestration.simulation.workers.provenance import machine, versions
 from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.files import Files
@@ -48,13 +57,13 @@ def lane_agreement(
         return None
     if not here:
         return _agreement(chosen, lanes, files, run)
-    place = kept_agreement.place_of((task.system for task in chosen), files)
-    if kept_agreement.is_kept(place):
+    place = place_of((task.system for task in chosen), files)
+    if is_kept(place):
         found = _agreement(chosen[:1], lanes, files, run)
         if found.agrees and (found.python is not None or not _has_twins(chosen[0].system, files)):
             return found
     found = _agreement(chosen, lanes, files, run)
-    kept_agreement.keep(place, found)
+    keep(place, found)
     return found
 
 
@@ -120,3 +129,55 @@ def _next_number(value: float, variable: Variable) -> float:
     """The next number above, or below if that exceeds the parameter's maximum."""
     above = math.nextafter(value, math.inf)
     return above if variable.maximum is None or above <= variable.maximum else math.nextafter(value, -math.inf)
+
+
+def place_of(systems: Iterable[System], files: Files) -> Path:
+    """The place in the user's cache of the agreement of a sample of runs: a hash of what it vouches for.
+
+    That is machine code: that of the same FMUs in systems of the same outline, made by this compiler for this
+    processor, and run by this version of the software. Numbers that vary within a study do not select other code.
+    """
+    import platformdirs
+
+    sampled = list(systems)
+    fmus = {fmu for system in sampled for fmu in system.fmus.values()}
+    twins = {python_twin(fmu) for fmu in fmus} & files.fmus.keys()
+    code = [machine(), versions(), compiler(), processor(), {fmu: files.hashes[fmu] for fmu in fmus | twins}]
+    content = _text([sorted({_text([outline(system), _choices(system)]) for system in sampled}), code])
+    key = hashlib.sha256(content.encode()).hexdigest()
+    return Path(platformdirs.user_cache_dir("quadcosim")) / "agreement" / f"{key}.json"
+
+
+def is_kept(place: Path) -> bool:
+    """Whether a whole sample has agreed."""
+    try:
+        return _vouches(LaneAgreement.from_text(place.read_text(encoding="utf-8")))
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return False
+
+
+def keep(place: Path, found: LaneAgreement) -> None:
+    """Keep the agreement of a whole sample; a difference ends what is kept."""
+    if _vouches(found) or not found.agrees:
+        with contextlib.suppress(OSError):  # where nothing can be written, each sweep repeats the whole sample
+            write_atomically(place, found.as_text())
+
+
+def _vouches(found: LaneAgreement) -> bool:
+    return found.runs == SAMPLE and found.agrees
+
+
+def _choices(system: System) -> dict[str, dict[str, Any]]:
+    """The parameters that may select other code: all but real numbers."""
+    return {
+        name: {key: value for key, value in component.parameters.items() if not isinstance(value, float)}
+        for name, component in system.components.items()
+    }
+
+
+def _text(content: Any) -> str:
+    return json.dumps(content, sort_keys=True, default=_plain)
+
+
+def _plain(part: Any) -> Any:
+    return sorted(part) if isinstance(part, frozenset) else dataclasses.asdict(part)

@@ -26,7 +26,7 @@ from orchestration.systems.system.check import check, connect_references, descri
 from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants, instance_of
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System, expressions
-from orchestration.systems.system.placement import placed_tasks
+from orchestration.systems.system.placement import tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms
 from orchestration.systems.system.source import MOTION, Source
 
@@ -280,11 +280,8 @@ def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str,
     samplings = {name: component.sampling for name, component in system.components.items()}
     periods = {name: component.step for name, component in system.components.items() if component.step is not None}
     periods |= {name: sampling.period for name, sampling in samplings.items() if isinstance(sampling, Sampling)}
-    periods |= {
-        each.task.component: each.task.period
-        for each in placed_tasks(system.computers)
-        if each.task.component is not None and each.task.period is not None
-    }
+    tasks = {name: placed.task.period for name, placed in tasks_of(system).items()}
+    periods |= {name: period for name, period in tasks.items() if period is not None}
     return {
         name: (period, believed)
         for name, period in periods.items()

@@ -16,8 +16,7 @@ from lxml import etree
 
 import quadcosim
 from fmu_kit.bundle import Target
-from fmu_kit.compiler.emit.standards import STANDARDS
-from fmu_kit.compiler.emit.terminals import TERMINALS
+from fmu_kit.compiler.emit.standards import STANDARDS, TERMINALS
 from fmu_kit.packaging import slave_class
 from orchestration.components.building import fmus
 from orchestration.components.building.models import MODELS

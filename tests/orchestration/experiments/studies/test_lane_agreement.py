@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.building.fmus import python_twin
-from orchestration.experiments.studies import kept_agreement
+from orchestration.experiments.studies import lane_agreement as kept
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import QuadcosimError
@@ -185,7 +185,7 @@ def test_a_chaotic_run_does_not_stand_for_its_sample(unknown: Path, several: Stu
 
 def test_other_code_is_compared_anew(unknown: Path, several: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     def place(study: Study) -> Path:
-        return kept_agreement.place_of([study.system(0, {})], files)
+        return kept.place_of([study.system(0, {})], files)
 
     files = with_python_twins(several.files())
     base = several.base
@@ -196,7 +196,7 @@ def test_other_code_is_compared_anew(unknown: Path, several: Study, monkeypatch:
     assert place(replace(several, base=replace(base, timing=replace(base.timing, delay=0.003)))) != before
     for name in ("versions", "machine", "compiler", "processor"):
         with monkeypatch.context() as changed:
-            changed.setattr(kept_agreement, name, lambda: ["other"])
+            changed.setattr(kept, name, lambda: ["other"])
             assert place(several) != before, name
     files.hashes[python_twin(several.system(0, {}).components["plant"].fmu)] = "other"
     assert place(several) != before
