@@ -14,7 +14,7 @@ from fmu_kit.compiler.pack.embedded_files import write
 from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from tests.commands import Main
-from tests.extent import sample
+from tests.extent import sample, tries
 from tests.fmu_kit.compiler.embedded import (
     ARM,
     M4F,
@@ -35,7 +35,7 @@ from tests.fmus.instance import Instance
 from tests.fmus.loop import MOTION, Loop
 from tests.fmus.making import PAIR
 
-H, STEPS = 0.01, 500
+H, STEPS = 0.01, tries(500, sampled=200)
 FLOWN = {"mass": 1.1, "wind.amplitude.x": 0.5, "initial.position.x": 0.3}
 """Of the plant, as embedded_flight.c has it."""
 TOLERANCES = {

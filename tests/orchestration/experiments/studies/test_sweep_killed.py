@@ -69,6 +69,7 @@ def test_a_killed_sweep_leaves_no_workers_runs_only_what_is_missing_and_ends_wit
     assert {index: after[index] for index in before} == before, "expected no run flown twice"
 
 
+@in_test_all
 def test_the_death_of_a_worker_loses_nothing_though_the_fmu_is_moved_away_meanwhile(
     folder: Path, reference: list[dict[str, Any]]
 ) -> None:
