@@ -8,6 +8,7 @@ from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
 from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.model import System
+from orchestration.theory.stability.lifted_component import of_one_rate
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
     Components,
@@ -56,7 +57,7 @@ def certified_loop(rest: AtRest) -> CertifiedLoop:
     period = float(rest.period) / NANOSECONDS
     components: Components = {}
     for name, component in system.components.items():
-        tangent = rest.tangents[name]
+        tangent = of_one_rate(rest.tangents[name])
         if component.sampling is not None:
             found = of_samples(tangent, component.sampling.period)
             varies = rest.simulation.instances[name].model.varies_step

@@ -10,6 +10,7 @@ import json
 from dataclasses import asdict, dataclass, replace
 
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.theory.stability.lifted_component import of_one_rate
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
@@ -78,7 +79,7 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
 
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
-    tangent = loop.tangent(name)
+    tangent = of_one_rate(loop.tangent(name))
     is_linear = tangent.accuracy <= SAME
     part: Continuous | SampledSystem
     if component.sampling is not None:

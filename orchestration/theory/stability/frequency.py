@@ -21,16 +21,24 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.lifted_margins import (
+    delay_margin,
+    gain_margins,
+    lifted_gains,
+    phase_margin,
+)
 from orchestration.theory.stability.linearise import (
     NEAR_ONE,
     Linearised,
+    clock_of,
     cut_open,
     in_isolation,
     rest_of_loop,
     sampled_component,
     stability_of,
 )
-from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
+from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
+from orchestration.theory.stability.loop_halves import closed, radius, response
 from orchestration.theory.stability.operating_point import deterministic
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
@@ -96,6 +104,8 @@ class Bode:
 
     dt: float
     """Time from sample to sample [s]."""
+    samples: int = 1
+    """Samples of the component in a period of all rates; margins are of a command at all of them."""
     stable: bool
     """Whether the closed loop is stable; margins are those of a stable loop only."""
     radius: float
@@ -112,7 +122,7 @@ class Bode:
     @property
     def verdict(self) -> str:
         """The smallest margins of a loop, or that it is unstable and has none."""
-        clock = f"sampled every {quantity(self.dt, 's')}"
+        clock = clock_of(self.dt, self.samples)
         if not self.stable:
             return f"{stability_of(self.radius)}, {clock}: an unstable loop has no margins"
         factors = [one.factor for loop in self.loops for one in loop.gain_margins]
@@ -156,12 +166,14 @@ def bode(request: RequestLike, component: str | None = None) -> Bode:
 
 def expect_decided(loop: Linearised) -> None:
     """Raise `UsageError` for a loop whose stability rounding may decide, or whose halves are not the whole of it."""
-    radius, by_halves = loop.radius, radius_with(loop, 0, 1.0)
-    if abs(radius - 1.0) < NEAR_ONE:
-        raise UsageError(f"the loop is neither stable nor unstable: its spectral radius is {radius:.9g}, which is 1")
-    if loop.rest.D.any() or (radius < 1.0) != (max(radius, by_halves) < 1.0):
+    whole, by_halves = loop.radius, radius(loop)
+    if abs(whole - 1.0) < NEAR_ONE:
+        raise UsageError(f"the loop is neither stable nor unstable: its spectral radius is {whole:.9g}, which is 1")
+    later = np.tri(loop.samples, k=-1, dtype=bool)  # what is measured follows from commands of earlier samples
+    follows = np.kron(later, np.ones(np.array(loop.rest.D.shape) // loop.samples, dtype=bool))
+    if loop.rest.D[~follows].any() or (whole < 1.0) != (max(whole, by_halves) < 1.0):
         raise UsageError(
-            f"the loop as a whole has a spectral radius of {radius:.6g}, its two halves one of {by_halves:.6g}: "
+            f"the loop as a whole has a spectral radius of {whole:.6g}, its two halves one of {by_halves:.6g}: "
             "the loop cannot be cut open there"
         )
 
@@ -172,19 +184,26 @@ def _bode(request: Request, component: str | None) -> Bode:
         name = sampled_component(system, component)
         known: KnownTangents = {}
         models = files_of(system).models_of(system)
-        with at_rest(system, instances, models=models, known=known) as rest:
+        with whole_at_rest(system, instances, models=models, known=known) as rest:
             loop = cut_open(rest, name)
 
         def late(delay: float) -> StateSpace:
-            with at_rest(delayed(system, name, delay), instances, models=models, known=known) as rest:
+            with whole_at_rest(delayed(system, name, delay), instances, models=models, known=known) as rest:
                 return rest_of_loop(rest, name)
 
         expect_decided(loop)
         frequencies, stable = _frequencies(loop), loop.radius < 1.0
-        gains = loop_gains(loop, frequencies)
-        found = tuple(_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop)) if stable else ()
+        if loop.samples == 1:
+            gains = loop_gains(loop, frequencies)
+            each = (_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop))
+        else:
+            curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
+            gains = np.array([curve for curve, _ in curves])
+            each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
+        found = tuple(each) if stable else ()
     return Bode(
-        dt=loop.rest.dt, stable=stable, radius=loop.radius, loops=found, frequencies=frequencies, gains=gains,
+        dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=found,
+        frequencies=frequencies, gains=gains,
         sensitivity_peak=max((each.sensitivity_peak for each in found), default=None),
     )  # fmt: skip
 
@@ -204,7 +223,31 @@ def receivers_of(request: RequestLike, output: str) -> str:
 
 
 def _commands(loop: Linearised) -> range:
-    return range(len(loop.component.outputs))
+    return range(len(loop.component.outputs) // loop.samples)
+
+
+def _lifted_margins(
+    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, peak: float, late: Callable[[float], StateSpace],
+    system: System,
+) -> LoopMargins:  # fmt: skip
+    """The margins of a command at all of its samples in a period."""
+    output = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}"
+    turn, crossover = phase_margin(loop, i) or (None, None)
+    factors = tuple(GainMargin(factor=factor, frequency=at) for factor, at in gain_margins(loop, i))
+    crossings = np.flatnonzero(np.diff(np.sign(np.abs(gain) - 1.0)))
+    estimates = [_turn(complex(gain[place])) / float(frequencies[place]) for place in crossings]
+    if turn is not None and crossover:
+        estimates.append(turn % (2.0 * math.pi) / crossover)
+    return LoopMargins(
+        input=receivers_of(system, output),
+        output=output,
+        gain_margin=min((one.factor for one in factors), key=lambda one: abs(math.log(one)), default=None),
+        gain_margins=factors,
+        phase_margin=None if turn is None else math.degrees(turn),
+        delay_margin=delay_margin(loop, i, min(estimates), late) if estimates else None,
+        crossover=crossover,
+        sensitivity_peak=peak,
+    )
 
 
 def _margins(
@@ -312,9 +355,9 @@ def loop_gains(
     The command `only` reaches the rest of the loop as it reaches `late`.
     """
     z = np.exp(1j * frequencies * loop.rest.dt)
-    rest, law = _response(loop.rest, z), _response(loop.component, z)
+    rest, law = response(loop.rest, z), response(loop.component, z)
     if late is not None:
-        rest[:, :, only] = _response(late, z)[:, :, only]
+        rest[:, :, only] = response(late, z)[:, :, only]
     back = -law @ rest
     count = back.shape[1]
     gains = np.empty((count, len(z)), dtype=complex)
@@ -326,27 +369,11 @@ def loop_gains(
     return gains
 
 
-def _response(of: StateSpace, z: Complexes) -> Complexes:
-    """The transfer function at some z, shape (n, outputs, inputs)."""
-    if not len(of.A):
-        return np.tile(of.D.astype(complex), (len(z), 1, 1))
-    states = np.linalg.solve(z[:, None, None] * np.eye(len(of.A)) - of.A, of.B.astype(complex)[None])
-    return np.asarray(of.C @ states + of.D, dtype=complex)
-
-
-def closed_loop(loop: Linearised, factors: Floats | None = None) -> Floats:
-    """The matrix of both halves over a sample; `factors` on the commands, default 1."""
-    rest, law = loop.rest, loop.component
-    gain = np.eye(len(law.outputs)) if factors is None else np.diag(factors)
-    B = rest.B @ gain
-    return np.block([[rest.A + B @ law.D @ rest.C, B @ law.C], [law.B @ rest.C, law.A]])
-
-
 def radius_with(loop: Linearised, i: int, factor: float) -> float:
     """The spectral radius of both halves with a factor on one command."""
     factors = np.ones(len(loop.component.outputs))
     factors[i] = factor
-    return float(np.abs(np.linalg.eigvals(closed_loop(loop, factors))).max(initial=0.0))
+    return radius(loop, factors)
 
 
 def _is_finite_at(loop: Linearised, frequency: float) -> bool:
@@ -359,10 +386,10 @@ def _is_finite_at(loop: Linearised, frequency: float) -> bool:
 def _frequencies(loop: Linearised) -> Floats:
     """Frequencies at which loops are evaluated [rad/s]: even in the logarithm, and closer about those of poles."""
     dt = loop.rest.dt
-    top = math.pi / dt
-    closed = _rates(closed_loop(loop), dt)
-    rates = np.concatenate([closed, _rates(loop.rest.A, dt), _rates(loop.component.A, dt)])
-    low = max(SLOWER * float(np.abs(closed).min(initial=top)), LOWEST * top)
+    top = math.pi / loop.dt
+    of_closed = _rates(closed(loop).A, dt)
+    rates = np.concatenate([of_closed, _rates(loop.rest.A, dt), _rates(loop.component.A, dt)])
+    low = max(SLOWER * float(np.abs(of_closed).min(initial=top)), LOWEST * top)
     about = [abs(rate.imag) + BESIDE_A_POLE * max(abs(rate.real), 1e-3 * abs(rate.imag)) for rate in rates]
     found = np.concatenate([np.geomspace(low, top, FREQUENCIES), *about])
     return np.unique(found[(found >= low) & (found <= top)])

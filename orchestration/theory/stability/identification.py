@@ -8,6 +8,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability.excitation import Excitation, Rest, Rung
+from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import Tangent
 
 HORIZONS = (16.0, 128.0, 1024.0)
@@ -27,21 +28,44 @@ SAMPLES = 32
 FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
-"""Difference allowed of the response from sample to sample, to a pulse on all inputs"""
+"""Difference of the responses to a pulse on all inputs at two samples, up to which they are alike"""
+MOST_SAMPLES = 20
+"""Samples after which the response of a component of several rates repeats, at most"""
+FEWEST_LIFTED = 8
+"""Rungs of the ladder of such a component, at least, each of all its samples"""
 
 
-def of_samples(rest: Rest, period: float, factor: float) -> Tangent:
+def of_samples(rest: Rest, period: float, factor: float) -> Tangent | LiftedTangent:
     """The tangent of a component that is sampled every `period` [s]; the pulses chosen are multiplied by `factor`.
 
-    Raises `UsageError` as `Tangent`, and where the response differs from sample to sample.
+    Where its response differs from sample to sample, and repeats after some, that of these samples together. Raises
+    `UsageError` as `Tangent`, and where it does not repeat.
     """
     excitation, sample = Excitation(rest), Rung(1, period)
     count = excitation.choose_pulse([sample] * (2 * SAMPLES))
     excitation.pulse *= factor
-    _expect_one_rate(excitation, sample)
+    samples = _samples_until_alike(excitation, sample)
+    if samples > 1:
+        rest.fmu.restore(excitation.rest.saved)
+        fmu = LiftedInstance(rest, samples, period)
+        rungs = max(FEWEST_LIFTED, SAMPLES // samples)
+        whole = _of_alike_samples(Excitation(lifted_rest(rest, fmu, samples)), samples * period, factor, rungs)
+        return LiftedTangent(whole, rest, fmu, samples)
+    return _tangent(excitation, sample, count)
+
+
+def _of_alike_samples(excitation: Excitation, period: float, factor: float, rungs: int) -> Tangent:
+    sample = Rung(1, period)
+    count = excitation.choose_pulse([sample] * (2 * rungs))
+    excitation.pulse *= factor
+    return _tangent(excitation, sample, count)
+
+
+def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
+    """The tangent of a component whose samples are alike, and linear over `count` of them."""
     ladder = [sample] * max(1, count // 2)
     tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
-    tangent.prove(period, 2.0 * len(ladder) * period)
+    tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
     return tangent
 
 
@@ -87,19 +111,27 @@ def _rungs(times: Floats, longest: float, unit: float | None) -> list[Rung]:
     return [Rung(count, float(length) / count) for count, length in zip(counts, lengths)]
 
 
-def _expect_one_rate(excitation: Excitation, sample: Rung) -> None:
-    """Raise `UsageError` where the response differs from sample to sample: the component has several rates."""
-    rest, first = excitation.rest, None
+def _samples_until_alike(excitation: Excitation, sample: Rung) -> int:
+    """After how many samples the response to a pulse repeats: more than 1 of a component of several rates.
+
+    Raises `UsageError` where it does not repeat within `MOST_SAMPLES`.
+    """
+    later, rest, responses = [sample] * MOST_SAMPLES, excitation.rest, list[Floats]()
     pulsed = excitation.held + excitation.pulses
-    for _ in range(SAMPLES):
-        perturbed, _ = excitation.stepped(rest, sample, pulsed)
+    for _ in range(2 * MOST_SAMPLES):
+        outputs, perturbed = excitation.stepped(rest, sample, pulsed)
         unperturbed, rest = excitation.followed(rest, sample)
-        response = (perturbed - unperturbed) / excitation.pulse
-        first = response if first is None else first
-        if np.abs(response - first).max(initial=0.0) > TURN * max(1.0, np.abs(first).max(initial=0.0)):
-            raise UsageError(
-                f"{excitation.name}: responds to a pulse differently from sample to sample, as code that counts them"
-            )
+        after = excitation.outputs_after(perturbed, later) - excitation.outputs_after(rest, later)
+        responses.append(np.vstack([outputs - unperturbed, after]) / excitation.pulse)
+    allowed = TURN * max(1.0, max(float(np.abs(each).max(initial=0.0)) for each in responses))
+    for samples in range(1, MOST_SAMPLES + 1):
+        apart = (np.abs(a - b).max(initial=0.0) for a, b in zip(responses, responses[samples:]))
+        if max(apart) <= allowed:
+            return samples
+    raise UsageError(
+        f"{excitation.name}: responds to a pulse differently from sample to sample, and not alike again within "
+        f"{MOST_SAMPLES} samples, as code whose slowest task has a longer period"
+    )
 
 
 def _dead_samples(excitation: Excitation, ladder: Sequence[Rung]) -> int:

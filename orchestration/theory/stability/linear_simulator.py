@@ -15,6 +15,8 @@ class LinearSimulator:
         self.state: Floats = np.zeros(states)
         self.input: Floats = np.zeros(len(inputs))
         self.output: Floats = np.zeros(len(outputs))
+        self.sample = 0
+        """The number of the next sample, from a begin of the loop's period, of one whose samples differ"""
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
         """As `Simulator`; variables that are no Reals are not read."""
@@ -56,13 +58,16 @@ class LinearSimulator:
 
 
 class OpenPort(LinearSimulator):
-    """Replaces a component: it outputs `sent`, and keeps in `received` its inputs at its last step."""
+    """Replaces a component: it outputs `sent` at its samples in a period, and keeps its inputs as `received`."""
 
-    def __init__(self, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    def __init__(self, inputs: Sequence[str], outputs: Sequence[str], samples: int = 1) -> None:
         super().__init__(inputs, outputs, states=0)
-        self.sent: Floats = np.zeros(len(outputs))
-        self.received: Floats = np.zeros(len(inputs))
+        self.sent: Floats = np.zeros(samples * len(outputs))
+        self.received: Floats = np.zeros(samples * len(inputs))
+        self._samples = samples
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
-        self.received[:], self.output[:] = self.input, self.sent
+        self.received.reshape(self._samples, -1)[self.sample] = self.input
+        self.output[:] = self.sent.reshape(self._samples, -1)[self.sample]
+        self.sample = (self.sample + 1) % self._samples

@@ -21,9 +21,10 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.lifted_component import lifted_names
 from orchestration.theory.stability.linear_simulator import OpenPort
-from orchestration.theory.stability.loop_at_rest import AtRest, at_rest
-from orchestration.theory.stability.matrices import of_samples
+from orchestration.theory.stability.loop_at_rest import AtRest, whole_at_rest
+from orchestration.theory.stability.matrices import of_lifted
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Pole, as_poles, poles_of
 from orchestration.theory.stability.state_space import StateSpace, reduced
@@ -49,6 +50,9 @@ class Linearised:
     operating_point: dict[str, float]
     """The values about which it is linear, by COMPONENT.VARIABLE: of all columns of a run, and of the component's
     inputs."""
+    samples: int = 1
+    """Samples of the component in a period of the loop, over which both halves go: more than 1 where others are slower,
+    or its own code has slower tasks. The signals of sample k end in [k] then."""
     radius: float
     """The spectral radius of the whole loop, closed, over a period, with what its halves leave out: below 1 small
     deviations decay."""
@@ -59,7 +63,17 @@ class Linearised:
     def verdict(self) -> str:
         """Whether the linear loop is stable, and its sizes."""
         sizes = f"{self.name} with {_count_of(len(self.component.A))}, the rest with {_count_of(len(self.rest.A))}"
-        return f"{stability_of(self.radius)}, sampled every {quantity(self.rest.dt, 's')}: {sizes}"
+        return f"{stability_of(self.radius)}, {self.clock}: {sizes}"
+
+    @property
+    def dt(self) -> float:
+        """Time from sample to sample of the component [s]."""
+        return self.rest.dt / self.samples
+
+    @property
+    def clock(self) -> str:
+        """When it is sampled, and how long the period of the loop is, in words."""
+        return clock_of(self.dt, self.samples)
 
 
 def linearise(request: RequestLike, component: str | None = None) -> Linearised:
@@ -71,7 +85,7 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     from the command and observable from the measurement.
 
     Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
-    component that is not sampled, or is sampled more often than another one.
+    component that is not sampled. Where several rates meet, both halves go over a period of all.
     """
     return in_isolation(request, _linearised, component)
 
@@ -88,7 +102,7 @@ def _linearised(request: Request, component: str | None) -> Linearised:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = rested(request)
         name = sampled_component(system, component)
-        with at_rest(system, instances) as loop:
+        with whole_at_rest(system, instances) as loop:
             return cut_open(loop, name)
 
 
@@ -101,36 +115,49 @@ def sampled_component(system: System, component: str | None) -> str:
 
 
 def cut_open(loop: AtRest, name: str) -> Linearised:
-    """A loop at rest, cut open at a sampled component; raises `UsageError` for one that is not the slowest."""
+    """A loop at rest, cut open at a sampled component."""
     sampling = loop.simulation.system.components[name].sampling
     assert sampling is not None
-    rest, board, at_samples = rest_of_loop(loop, name), loop.simulation.master.board, loop.rest_of(name)
+    rest, samples = rest_of_loop(loop, name), samples_of(loop, name)
+    board, at_samples = loop.simulation.master.board, loop.rest_of(name)
     point = {column: float(board.row[place]) for column, place in board.place.items() if column != "time"}
     point |= {f"{name}.{end}": value for end, value in zip(at_samples.inputs, at_samples.held.tolist())}
     whole = period_map(loop)
     return Linearised(
         name=name,
-        component=StateSpace(**vars(of_samples(loop.tangents[name], sampling.period)), dt=rest.dt),
+        component=StateSpace(**vars(of_lifted(loop.tangents[name], sampling.period, samples)), dt=rest.dt),
         rest=rest,
         operating_point=point,
+        samples=samples,
         radius=float(np.abs(np.linalg.eigvals(whole)).max(initial=0.0)),
         poles=as_poles(poles_of(whole), rest.dt),
     )
 
 
 def rest_of_loop(loop: AtRest, name: str) -> StateSpace:
-    """The rest of a loop at rest, as a sampled component sees it; raises `UsageError` as `cut_open`."""
-    sampling, tangent = loop.simulation.system.components[name].sampling, loop.tangents[name]
-    assert sampling is not None
-    if sampling.true_period != loop.period:
-        raise UsageError(
-            f"component: {name}: expected the only rate of the system, or the slowest, which others divide"
-        )
-    port, dt = OpenPort(tangent.inputs, tangent.outputs), float(loop.period) / NANOSECONDS
+    """The rest of a loop at rest, as a sampled component sees it."""
+    tangent, samples = loop.tangents[name], samples_of(loop, name)
+    port, dt = OpenPort(tangent.inputs, tangent.outputs, samples), float(loop.period) / NANOSECONDS
     whole = period_map(loop, {name: port})
-    size = len(whole) - len(port.inputs)
+    size = len(whole) - len(port.received)
     A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
-    return StateSpace(A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt, inputs=port.outputs, outputs=port.inputs)
+    return StateSpace(
+        A=A, B=B, C=C, D=np.array(whole[size:, size:]), dt=dt,
+        inputs=lifted_names(port.outputs, samples), outputs=lifted_names(port.inputs, samples),
+    )  # fmt: skip
+
+
+def samples_of(loop: AtRest, name: str) -> int:
+    """The samples of a component in a period of a loop."""
+    sampling = loop.simulation.system.components[name].sampling
+    assert sampling is not None
+    return int(loop.period / sampling.true_period)
+
+
+def clock_of(dt: float, samples: int) -> str:
+    """When a component is sampled, every `dt` [s], and how long the period of its loop is, in words."""
+    often = f"sampled every {quantity(dt, 's')}"
+    return often if samples == 1 else f"{often}, in a period of all rates of {quantity(samples * dt, 's')}"
 
 
 def stability_of(radius: float) -> str:

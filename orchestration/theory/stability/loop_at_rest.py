@@ -28,11 +28,13 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import expect_fixed_periods
 from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.identification import FINEST, in_continuous_time, of_samples
+from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.operating_point import (
     deterministic,
     exchanged_signals,
     expect_rest,
+    hyperperiod,
     hyperperiod_of,
     latest_offset,
 )
@@ -56,7 +58,8 @@ class ExtraSignals:
 NO_SIGNALS = ExtraSignals()
 
 
-KnownTangents = dict[str, tuple[Component, Fraction, Tangent]]
+AnyTangent = Tangent | LiftedTangent
+KnownTangents = dict[str, tuple[Component, Fraction, AnyTangent]]
 """Tangents by the name of the component, with what it was, and the period that the ladder is for"""
 
 
@@ -78,11 +81,11 @@ class AtRest:
     """Those of other systems whose components may come to rest alike"""
 
     @cached_property
-    def tangents(self) -> dict[str, Tangent]:
+    def tangents(self) -> dict[str, AnyTangent]:
         """The components about rest."""
         return {name: self.tangent(name) for name in self.simulation.instances}
 
-    def tangent(self, name: str) -> Tangent:
+    def tangent(self, name: str) -> AnyTangent:
         """A component about rest."""
         self.simulation.instances[name].restore(self.saved_states[name])
         component = self.simulation.system.components[name]
@@ -129,7 +132,42 @@ def at_rest(
     rest there, or has no linear loop, saying why.
     """
     calm = deterministic(system)
-    period = _expect_period(calm)
+    with _settled(calm, _expect_period(calm), instances, factor, extra, models, {} if known is None else known) as loop:
+        yield loop
+
+
+@contextmanager
+def whole_at_rest(
+    system: System,
+    instances: Instances,
+    factor: float = 1.0,
+    models: Mapping[str, Model] | None = None,
+    known: KnownTangents | None = None,
+) -> Iterator[AtRest]:
+    """As `at_rest`, over a period after which components of several rates respond as before, too."""
+    calm, known = deterministic(system), {} if known is None else known
+    seen = {name: tangent for name, (_, _, tangent) in known.items() if name in calm.components}
+    period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
+    with _settled(calm, period, instances, factor, NO_SIGNALS, models, known) as loop:
+        whole = hyperperiod([period, *_cycles(calm, loop.tangents)])
+        if whole == period:
+            yield loop
+            return
+    with _settled(calm, whole, instances, factor, NO_SIGNALS, models, known) as loop:
+        yield loop
+
+
+@contextmanager
+def _settled(
+    calm: System,
+    period: Fraction,
+    instances: Instances,
+    factor: float,
+    extra: ExtraSignals,
+    models: Mapping[str, Model] | None,
+    known: KnownTangents,
+) -> Iterator[AtRest]:
+    """A system that has come to rest over some periods."""
     delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
     begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
@@ -140,8 +178,16 @@ def at_rest(
         _settle(simulation, begin, period)
         yield AtRest(
             simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
-            factor=factor, extra=extra, begin=begin, period=period, known={} if known is None else known,
+            factor=factor, extra=extra, begin=begin, period=period, known=known,
         )  # fmt: skip
+
+
+def _cycles(system: System, tangents: Mapping[str, AnyTangent]) -> Iterator[Fraction]:
+    """After how long components of several rates respond as before [ns]."""
+    for name, tangent in tangents.items():
+        sampling = system.components[name].sampling
+        if isinstance(tangent, LiftedTangent) and sampling is not None:
+            yield tangent.samples * sampling.true_period
 
 
 # -- coming to rest -------------------------------------------------------------------------------------------------
@@ -186,7 +232,7 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     expect_rest(system, np.array(rows))
 
 
-def _tangent(loop: AtRest, name: str, factor: float) -> Tangent:
+def _tangent(loop: AtRest, name: str, factor: float) -> AnyTangent:
     model, rest = loop.simulation.instances[name].model, loop.rest_of(name)
     component, period = loop.simulation.system.components[name], float(loop.period) / NANOSECONDS
     if component.sampling is not None:

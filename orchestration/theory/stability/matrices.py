@@ -11,6 +11,7 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, nanoseconds
 from orchestration.foundation.processes.passable import passable
+from orchestration.theory.stability.lifted_component import LiftedTangent, lifted_names
 from orchestration.theory.stability.linearised_component import Tangent
 
 NEAR, FAR = 0.1, 0.5
@@ -75,6 +76,28 @@ def of_samples(tangent: Tangent, period: float) -> Matrices:
     return Matrices(
         inputs=tangent.inputs, outputs=tangent.outputs,
         A=by_state[count:], B=by_input[count:], C=by_state[:count], D=by_input[:count],
+    )  # fmt: skip
+
+
+def of_lifted(tangent: Tangent | LiftedTangent, period: float, samples: int) -> Matrices:
+    """The matrices over several samples, a `period` [s] apart: by the inputs at each, the outputs at each."""
+    whole, own = (tangent.whole, tangent.samples) if isinstance(tangent, LiftedTangent) else (tangent, 1)
+    one, steps = of_samples(whole, own * period), samples // own
+    if steps == 1:
+        return one
+    A, (p, m) = one.A, one.D.shape
+    powers = [np.eye(len(A))]
+    for _ in range(steps):
+        powers.append(powers[-1] @ A)
+    D = np.zeros((steps * p, steps * m))
+    for k in range(steps):
+        for j in range(k + 1):
+            block = one.D if j == k else one.C @ powers[k - j - 1] @ one.B
+            D[k * p : (k + 1) * p, j * m : (j + 1) * m] = block
+    return Matrices(
+        inputs=lifted_names(tangent.inputs, samples), outputs=lifted_names(tangent.outputs, samples), A=powers[steps],
+        B=np.hstack([powers[steps - 1 - k] @ one.B for k in range(steps)]),
+        C=np.vstack([one.C @ powers[k] for k in range(steps)]), D=D,
     )  # fmt: skip
 
 

@@ -25,9 +25,9 @@ from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
-from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, at_rest
+from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, whole_at_rest
 
-MAX_STATES = 400
+MAX_STATES = 1000
 """states of a loop"""
 
 
@@ -41,6 +41,8 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     master = _master(loop, simulators)
     master.initialise()
     master.run(pause_at=round(loop.begin))
+    for one in simulators.values():
+        one.sample = 0
     places = [*_state_parts(master, simulators), *(port.sent for port in ports.values())]
     received = [port.received for port in ports.values()]
     columns, rows = sum(map(len, places)), sum(map(len, [*_state_parts(master, simulators), *received]))
@@ -67,7 +69,7 @@ def growth_of_loop(
     Tangents are kept in `known`, as by `at_rest`. Raises `UsageError` where the system does not rest there, or has no
     linear loop, saying why.
     """
-    with at_rest(system, instances, factor, known=known) as loop:
+    with whole_at_rest(system, instances, factor, known=known) as loop:
         radius = float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0))
         return math.log(radius) / (float(loop.period) / NANOSECONDS) if radius > 0.0 else -math.inf
 

@@ -25,7 +25,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.loop_at_rest import KnownTangents, at_rest
+from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Complexes, poles_of
 
@@ -145,7 +145,7 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
 
         def radius(value: float) -> float:
             try:
-                with at_rest(changed(system, dict.fromkeys(varied.paths, value)), instances, known=known) as loop:
+                with whole_at_rest(changed(system, dict.fromkeys(varied.paths, value)), instances, known=known) as loop:
                     found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
             except UsageError as error:
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
@@ -160,7 +160,7 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         for (low, before), (high, after) in pairwise(zip(values, radii, strict=True)):
             if (before < 1.0) == (after < 1.0):
                 continue
-            at = _zero(
+            at = zero_between(
                 lambda value: radius(value) - 1.0,
                 lambda value: _short(value, unit),
                 (low, before - 1.0),
@@ -186,7 +186,7 @@ def _short(value: float, unit: str | None) -> float:
     return round(value, 9) if unit == "s" else float(f"{value:.9g}")
 
 
-def _zero(
+def zero_between(
     of: Callable[[float], float], short: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]
 ) -> float:
     """Where a function is 0 between two points (x, y) with y of opposite signs: by secants, and halves at a jump."""

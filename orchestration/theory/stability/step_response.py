@@ -11,8 +11,9 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike
-from orchestration.theory.stability.frequency import closed_loop, expect_decided, receivers_of
-from orchestration.theory.stability.linearise import Linearised, linearise
+from orchestration.theory.stability.frequency import expect_decided, receivers_of
+from orchestration.theory.stability.linearise import Linearised, clock_of, linearise
+from orchestration.theory.stability.loop_halves import ClosedLoop, closed
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.gallery import Figures
@@ -52,6 +53,8 @@ class Step:
 
     dt: float
     """Time from sample to sample [s]."""
+    samples: int = 1
+    """Samples of the component in a period of all rates."""
     loops: tuple[LoopStep, ...]
     """The loops, one for each command."""
     times: Floats = field(repr=False)
@@ -67,7 +70,7 @@ class Step:
         settled = f"settles in {quantity(slowest.settling_time, 's')}"
         return (
             f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
-            f"sampled every {quantity(self.dt, 's')} (small deviations)"
+            f"{clock_of(self.dt, self.samples)} (small deviations)"
         )
 
     @property
@@ -102,30 +105,38 @@ def step(request: RequestLike, component: str | None = None) -> Step:
     expect_decided(loop)
     if loop.radius > 1.0:
         raise UsageError(f"step: expected a stable loop; the spectral radius of this one is {loop.radius:.6g}")
-    A = closed_loop(loop)
-    commands = np.hstack([loop.component.D @ loop.rest.C, loop.component.C])
-    steps = np.vstack([loop.rest.B, np.zeros((len(loop.component.A), loop.rest.B.shape[1]))])
-    responses = _responses(A, steps, commands, float(np.abs(np.linalg.eigvals(A)).max(initial=0.0)))
-    times: Floats = loop.rest.dt * np.arange(responses.shape[1], dtype=float)
-    final = -np.diag(commands @ np.linalg.solve(np.eye(len(A)) - A, steps))
-    found = (_figures(loop, request, i, times, responses[i], float(final[i])) for i in range(len(commands)))
-    return Step(dt=loop.rest.dt, loops=tuple(found), times=times, responses=responses)
+    whole, count = closed(loop), len(loop.component.outputs) // loop.samples
+    each = np.tile(np.eye(count), (loop.samples, 1))  # a step of 1 on a command is on all of its samples
+    responses = _responses(whole, each, float(np.abs(np.linalg.eigvals(whole.A)).max(initial=0.0)))
+    times: Floats = loop.dt * np.arange(responses.shape[1], dtype=float)
+    settled = np.asarray(np.linalg.solve(np.eye(len(whole.A)) - whole.A, whole.steps @ each), dtype=float)
+    final = _taken_back(whole, each, settled).mean(axis=1)
+    found = (_figures(loop, request, i, times, responses[i], float(final[i])) for i in range(count))
+    return Step(dt=loop.dt, samples=loop.samples, loops=tuple(found), times=times, responses=responses)
 
 
-def _responses(A: Floats, steps: Floats, commands: Floats, radius: float) -> Floats:
+def _taken_back(whole: ClosedLoop, each: Floats, state: Floats) -> Floats:
+    """What the law takes back at the samples of a period, shape (commands, samples), by the state at its begin."""
+    count = each.shape[1]
+    sent = (whole.commands @ state + whole.direct @ each).reshape(-1, count, count)
+    return np.asarray(-np.diagonal(sent, axis1=1, axis2=2).T)
+
+
+def _responses(whole: ClosedLoop, each: Floats, radius: float) -> Floats:
     """What the law takes back at each sample, shape (commands, n), until nothing moves."""
+    A, steps, samples = whole.A, whole.steps @ each, len(each) // each.shape[1]
     count = MAX_SAMPLES if radius >= 1.0 else math.ceil(math.log(LEFT) / math.log(max(radius, LEFT))) + len(A) + 1
-    if count >= MAX_SAMPLES:
+    if count * samples >= MAX_SAMPLES:
         raise UsageError(f"step: expected a response of at most {MAX_SAMPLES} samples; this loop needs more")
-    state, found = np.zeros_like(steps), np.zeros((len(commands), count))
+    state, found = np.zeros_like(steps), np.zeros((each.shape[1], count, samples))
     for k in range(count):
-        found[:, k] = -np.diag(commands @ state)
+        found[:, k] = _taken_back(whole, each, state)
         state = A @ state + steps
-    return found
+    return found.reshape(len(found), -1)
 
 
 def _figures(loop: Linearised, request: RequestLike, i: int, times: Floats, response: Floats, final: float) -> LoopStep:
-    output = f"{loop.name}.{loop.component.outputs[i]}"
+    output = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}"
     largest = float(np.abs(response).max(initial=0.0))
     has_value = abs(final) > NO_VALUE * max(largest, 1.0)
     share = response / final if has_value else response

@@ -16,13 +16,16 @@ from fmu_kit.bundle import Target
 from orchestration.components.building import builder
 from orchestration.components.building.models import CONTROLLERS, MODELS
 from orchestration.components.fmi.read_description import read_model
+from orchestration.components.fmi.reuse import Instances
 from orchestration.components.scaffold.folder import write
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.simulation.requests.one_fmu import alone
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.simulation import run
-from quadcosim import FmuChoice, Scenario, changed, load_study, load_system
+from orchestration.theory.stability.period_map import growth_of_loop
+from orchestration.theory.stability.perturbed_runs import growth_of
+from quadcosim import FmuChoice, Scenario, UsageError, bode, changed, load_study, load_system, margin
 from tests.commands import Main
 from tests.extent import in_test_all, sample
 from tests.orchestration.components.building.test_wrap import PD, PD_C, PD_H
@@ -168,6 +171,43 @@ def test_tasks_are_paused_whole_and_have_limits(parts: Path, main: Main) -> None
     asked = ("--of", "connections.command.delay", "--from", "0.6", "--to", "0.8", "--scan", "0.1", "--json", "--build")
     found = json.loads(main("limit", parts / "two_tasks.toml", *asked, "--tolerance", "0.02", "--no-figures").stdout)
     assert (found["large_signal_limit"], found["local_limit"]) == pytest.approx((0.686137, 0.686137), abs=0.02)
+
+
+def test_a_loop_of_code_of_two_rates_has_the_poles_and_margins_of_a_map_made_by_hand(parts: Path) -> None:
+    """The position every 0.25 s, the speed every 0.05 s: five samples are a period of the loop."""
+    tasks = TWO_TASKS.replace('"position_task"\nperiod = 0.05', '"position_task"\nperiod = 0.25')
+    (parts / "rates.toml").write_text(IN_TWO.format(period="", steps=tasks))
+    file = parts / "rates_system.toml"
+    file.write_text((parts / "one_step.toml").read_text().replace("one.toml", "rates.toml"))
+
+    def by_hand(factor: complex, late: int = 0) -> np.ndarray:
+        """Of x, v, what the position task wants, and commands on the way, over a period, with a factor on commands."""
+        whole, h = np.eye(3 + late, dtype=complex), 0.05
+        for k in range(5):
+            if k == 0:
+                whole[2] = -whole[0]
+            sent = np.vstack([whole[3:], factor * (whole[2] - whole[1])])
+            x, v, u = whole[0], whole[1], sent[0]
+            whole = np.vstack([x + h * v + 0.5 * h * h * u, v + h * u, whole[2], sent[1:]])
+        return whole
+
+    def radius(factor: complex, late: int = 0) -> float:
+        return float(np.abs(np.linalg.eigvals(by_hand(factor, late))).max())
+
+    system = load_system(file)
+    found = bode(system)
+    (loop,) = found.loops
+    assert (found.dt, found.samples, found.radius) == (0.05, 5, pytest.approx(radius(1.0), abs=1e-9))
+    assert radius(loop.gain_margin) == pytest.approx(1.0, abs=1e-6)
+    turned = np.exp(-1j * np.radians(loop.phase_margin))
+    assert radius(turned) == pytest.approx(1.0, abs=1e-6)
+    assert min(np.abs(np.angle(np.linalg.eigvals(by_hand(turned))) - 0.25 * loop.crossover)) < 1e-6
+    late = int(loop.delay_margin / 0.05)
+    assert radius(1.0, late) < 1.0 < radius(1.0, late + 1)
+    with contextlib.closing(Instances()) as instances:
+        assert growth_of_loop(system, instances) == pytest.approx(growth_of(system, instances).rate, abs=1e-5)
+    with pytest.raises(UsageError, match="controller: responds alike only at every 5th sample, as code of several"):
+        margin(system, "connections.command.delay_jitter")
 
 
 def bits(path: Path) -> list[tuple[Any, ...]]:

@@ -12,8 +12,9 @@ import pytest
 
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.theory.stability.frequency import closed_loop, delayed, expect_decided, loop_gains
-from quadcosim import Bode, Linearised, StateSpace, Step, UsageError, bode, linearise, step
+from orchestration.theory.stability.frequency import delayed, expect_decided, loop_gains
+from orchestration.theory.stability.loop_halves import closed
+from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, step
 from tests.commands import Main
 from tests.examples.common import example
 from tests.extent import sample
@@ -148,7 +149,27 @@ def test_a_loop_that_rounding_decides_is_refused_and_so_are_halves_that_are_not_
     law = dataclasses.replace(loop.component, C=10.0 * loop.component.C, D=10.0 * loop.component.D)
     with pytest.raises(UsageError, match="cannot be cut open there"):
         expect_decided(dataclasses.replace(loop, component=law))
-    assert np.abs(np.linalg.eigvals(closed_loop(loop))).max() == pytest.approx(loop.radius, rel=1e-9)
+    assert np.abs(np.linalg.eigvals(closed(loop).A)).max() == pytest.approx(loop.radius, rel=1e-9)
+
+
+def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
+    """A second component, which nothing is connected to, is sampled half as often."""
+    one = system_of("dc_servo")
+    other = dataclasses.replace(one.components["controller"], sampling=Sampling(period=0.012))
+    both = dataclasses.replace(one, components={**one.components, "other": other})
+    found, known = bode(both, "controller"), bode_of("dc_servo")
+    assert (found.dt, found.samples, found.radius) == (known.dt, 2, pytest.approx(known.radius**2, rel=1e-9))
+    assert "sampled every 6 ms, in a period of all rates of 12 ms: gain margin 3.25, phase" in found.verdict
+    (loop,), (of_one,) = found.loops, known.loops
+    for name in ("gain_margin", "phase_margin", "crossover", "sensitivity_peak"):
+        assert getattr(loop, name) == pytest.approx(getattr(of_one, name), rel=1e-5), name
+    assert loop.delay_margin == pytest.approx(of_one.delay_margin, abs=2e-8)
+    for frequency in (1.0, 50.0, 300.0, 500.0):
+        sizes = [np.interp(frequency, each.frequencies, np.abs(each.gains[0])) for each in (found, known)]
+        assert sizes[0] == pytest.approx(sizes[1], rel=1e-3)
+    stepped, (of_step,) = step(both, "controller"), step_of("dc_servo").loops
+    assert stepped.loops[0].overshoot == pytest.approx(of_step.overshoot, rel=1e-6)
+    assert stepped.responses[0, :40] == pytest.approx(step_of("dc_servo").responses[0, :40], abs=1e-9)
 
 
 def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Path) -> None:

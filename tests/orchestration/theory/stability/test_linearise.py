@@ -122,13 +122,6 @@ def test_a_component_at_which_no_loop_can_be_cut_open_is_refused(
         linearise(example(name), component)
 
 
-def test_a_component_that_samples_more_often_than_another_is_refused(system: System) -> None:
-    slower = dataclasses.replace(system.components["controller"], sampling=quadcosim.Sampling(period=0.1))
-    both = dataclasses.replace(system, components={**system.components, "other": slower})
-    with pytest.raises(UsageError, match=r"^component: controller: expected the only rate of the system, or the slow"):
-        linearise(both, "controller")
-
-
 def test_a_linearised_loop_is_a_system_of_python_control_with_its_names(system: System) -> None:
     control = pytest.importorskip("control")
     rest = linearise(changed(system, {PERIOD: 0.5})).rest

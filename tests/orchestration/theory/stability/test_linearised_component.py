@@ -9,6 +9,7 @@ import pytest
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.theory.stability.excitation import Excitation, Rest, Rung
 from orchestration.theory.stability.identification import of_samples
+from orchestration.theory.stability.lifted_component import of_one_rate
 from orchestration.theory.stability.linearised_component import Tangent
 from quadcosim import UsageError
 
@@ -49,7 +50,7 @@ def rest(fmu: Any) -> Rest:
 
 
 def tangent(fmu: Any) -> Tangent:
-    return of_samples(rest(fmu), 1.0, 1.0)
+    return of_one_rate(of_samples(rest(fmu), 1.0, 1.0))
 
 
 def responses(simulator: Any, samples: int) -> list[float]:

@@ -22,9 +22,8 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import local_limit as local
 from orchestration.theory.stability import loop_at_rest
-from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.local_limit import LOOP, TWINS, local_limits
-from orchestration.theory.stability.loop_at_rest import KnownTangents
+from orchestration.theory.stability.loop_at_rest import AnyTangent, KnownTangents
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import Growth, growth_of
 from quadcosim import Scenario, Timing, UsageError
@@ -168,7 +167,7 @@ def test_a_component_that_rests_as_for_another_value_is_identified_once(
 ) -> None:
     identified: list[str] = []
 
-    def tangent(loop: Any, name: str, factor: float) -> Tangent:
+    def tangent(loop: Any, name: str, factor: float) -> AnyTangent:
         identified.append(name)
         return usual(loop, name, factor)
 

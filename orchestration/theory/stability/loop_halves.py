@@ -1,0 +1,55 @@
+"""The two halves of a loop that is cut open, closed again: poles, commands, and what a step on commands does."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.stability.linearise import Linearised
+from orchestration.theory.stability.poles import Complexes
+from orchestration.theory.stability.state_space import StateSpace
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoop:
+    """Both halves over a period: the state, that of the rest before that of the component."""
+
+    A: Floats
+    """The state after a period by that before it."""
+    commands: Floats
+    """Commands, with their factors, by the state."""
+    steps: Floats
+    """The state after a period by what is added to the commands in it."""
+    direct: Floats
+    """Commands by what is added to commands of earlier samples of the period."""
+
+
+def closed(loop: Linearised, factors: Floats | Complexes | None = None) -> ClosedLoop:
+    """The loop with `factors` on the commands, default 1."""
+    rest, law = loop.rest, loop.component
+    gain = np.eye(len(law.outputs)) if factors is None else np.diag(factors)
+    identity = np.eye(len(gain))
+    sent: Any = np.linalg.inv(identity - gain @ law.D @ rest.D) if rest.D.any() else identity
+    commands = sent @ np.hstack([gain @ law.D @ rest.C, gain @ law.C])
+    moved = np.vstack([rest.B, law.B @ rest.D])
+    open_loop = np.block([[rest.A, np.zeros((len(rest.A), len(law.A)))], [law.B @ rest.C, law.A]])
+    return ClosedLoop(A=open_loop + moved @ commands, commands=commands, steps=moved @ sent, direct=sent - identity)
+
+
+def radius(loop: Linearised, factors: Floats | Complexes | None = None) -> float:
+    """The spectral radius of both halves with `factors` on the commands."""
+    return float(np.abs(np.linalg.eigvals(closed(loop, factors).A)).max(initial=0.0))
+
+
+def with_rest(loop: Linearised, A: Floats, B: Floats, C: Floats, D: Floats) -> Linearised:
+    """The loop with another rest, of the same signals."""
+    return replace(loop, rest=replace(loop.rest, A=A, B=B, C=C, D=D))
+
+
+def response(of: StateSpace, z: Complexes) -> Complexes:
+    """The transfer function at some z, shape (n, outputs, inputs)."""
+    if not len(of.A):
+        return np.tile(of.D.astype(complex), (len(z), 1, 1))
+    states = np.linalg.solve(z[:, None, None] * np.eye(len(of.A)) - of.A, of.B.astype(complex)[None])
+    return np.asarray(of.C @ states + of.D, dtype=complex)
