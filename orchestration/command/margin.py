@@ -165,7 +165,7 @@ def linearise(
         "rest": _matrices(loop.rest),
         "poles": [dataclasses.asdict(pole) for pole in loop.poles],
     }
-    lines = [f"{name:<17}  {_summary(half)}" for name, half in halves.items()]
+    lines = [f"{name:<17}  {_summary(half, loop.samples)}" for name, half in halves.items()]
     rows = [("pole", "size", "frequency", "damping")]
     for pole in loop.poles:
         if pole.imaginary >= 0.0:
@@ -183,6 +183,10 @@ def _matrices(system: "StateSpace") -> dict[str, object]:
     return {**matrices, "dt": system.dt, "inputs": system.inputs, "outputs": system.outputs}
 
 
-def _summary(system: "StateSpace") -> str:
-    inputs, outputs = (", ".join(names) for names in (system.inputs, system.outputs))
-    return f"{inputs} → {outputs}; {len(system.A)} states, every {system.dt:g} s"
+def _summary(system: "StateSpace", samples: int) -> str:
+    inputs, outputs = (
+        ", ".join(name.removesuffix("[0]") if samples > 1 else name for name in names[: len(names) // samples])
+        for names in (system.inputs, system.outputs)
+    )
+    each = "" if samples == 1 else f", each at {samples} samples"
+    return f"{inputs} → {outputs}{each}; {len(system.A)} states, every {system.dt:g} s"

@@ -241,7 +241,7 @@ def _lifted_margins(
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
-        gain_margin=min((one.factor for one in factors), key=lambda one: abs(math.log(one)), default=None),
+        gain_margin=min((one.factor for one in factors), key=_away_from_one, default=None),
         gain_margins=factors,
         phase_margin=None if turn is None else math.degrees(turn),
         delay_margin=delay_margin(loop, i, min(estimates), late) if estimates else None,

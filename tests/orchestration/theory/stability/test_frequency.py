@@ -159,11 +159,13 @@ def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
     both = dataclasses.replace(one, components={**one.components, "other": other})
     found, known = bode(both, "controller"), bode_of("dc_servo")
     assert (found.dt, found.samples, found.radius) == (known.dt, 2, pytest.approx(known.radius**2, rel=1e-9))
-    assert "sampled every 6 ms, in a period of all rates of 12 ms: gain margin 3.25, phase" in found.verdict
+    assert "sampled every 6 ms, in a period of all rates of 12 ms: gain margins 0.169 and 3.25, phase" in found.verdict
     (loop,), (of_one,) = found.loops, known.loops
     for name in ("gain_margin", "phase_margin", "crossover", "sensitivity_peak"):
         assert getattr(loop, name) == pytest.approx(getattr(of_one, name), rel=1e-5), name
     assert loop.delay_margin == pytest.approx(of_one.delay_margin, abs=2e-8)
+    for mine, theirs in zip(loop.gain_margins, of_one.gain_margins, strict=True):
+        assert (mine.factor, mine.frequency) == pytest.approx((theirs.factor, theirs.frequency), rel=1e-5)
     for frequency in (1.0, 50.0, 300.0, 500.0):
         sizes = [np.interp(frequency, each.frequencies, np.abs(each.gains[0])) for each in (found, known)]
         assert sizes[0] == pytest.approx(sizes[1], rel=1e-3)
