@@ -122,8 +122,8 @@ def test_a_loop_of_one_command_has_the_others_closed() -> None:
             outputs=("",) * outputs,
         )  # fmt: skip
 
-    halves = {"component": half(2, 2, 3, 0.5), "rest": half(4, 3, 2, 0.0)}
-    loop = Linearised(name="law", **halves, operating_point={}, radius=0.5, poles=())
+    law, others = half(2, 2, 3, 0.5), half(4, 3, 2, 0.0)
+    loop = Linearised(name="law", component=law, rest=others, operating_point={}, radius=0.5, poles=())
     z = np.exp(0.7j)
 
     def at(of: StateSpace) -> np.ndarray:
