@@ -33,7 +33,7 @@ def main() -> None:
     limited = run(Scenario(stop_time=4.0).with_changes(parameters={"plant.torque_max": 20.0}))
     lossy = Timing(period=0.02, delay=0.012, jitter=0.006, measurement_loss=0.15, command_loss=0.15)
     figures = {
-        **draw(flight, ("path", "errors", "components", "phase", "spectrum"), style=DOCS),
+        **draw(flight, ("path", "errors", "components"), style=DOCS),
         **draw(run(Scenario(stop_time=2.0, timing=lossy)), ("commands",), window=(0.2, 0.8), style=DOCS),
         "overlay": draw((flight, slow), ("components",), window=(0.0, 8.0), style=DOCS)["components"],
         "saturation": draw(limited, ("commands",), window=(0.0, 2.0), style=DOCS)["commands"],

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.quadrotor.flight.errors import ERRORS, Error, draw_components
+from orchestration.quadrotor.flight.errors import ERRORS, Error, cut, draw_components
 from orchestration.quadrotor.flight.path import draw_in_space
 from orchestration.quadrotor.scenarios.measures import position_error
 from orchestration.simulation.figures.drawn_run import DrawnRun
@@ -30,11 +30,12 @@ def figure_3(result: Result, style: Style) -> Figure:
     draw_in_space(axes, [run], style)
     left.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     panels = right.subplots(4, 1, sharex=True)
+    shown = cut(run)
     for panel, error in zip(panels, _as_printed(), strict=True):
-        draw_components(panel, run, error, style, clips=False)
+        draw_components(panel, shown, error, style, clips=False)
         panel.set_ylabel(panel.get_ylabel().replace("angular velocity", "ang. velocity"))
     panels[0].legend(loc="upper right", ncols=3)
-    panels[-1].set_xlabel(TIME)
+    panels[-1].set_xlabel(f"{TIME}; flat from there to {run.span[1]:g} s")
     right.align_ylabels(panels)
     return figure
 

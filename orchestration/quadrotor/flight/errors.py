@@ -48,7 +48,7 @@ def components_of_errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """x, y and z of each error; with several runs a panel for each component."""
     if len(runs) > 1:
         return _overlaid(runs, style)
-    run = _cut(runs[0])
+    run = cut(runs[0])
     figure, panels = _panels([run], style)
     if run is not runs[0]:
         figure.supxlabel(f"flat from there to {runs[0].span[1]:g} s", fontsize="small")
@@ -63,7 +63,7 @@ FLAT, CUT = 0.02, 0.2
 """Share of its range within which an error is flat; share of the run beyond which it is cut if all errors are"""
 
 
-def _cut(run: DrawnRun) -> DrawnRun:
+def cut(run: DrawnRun) -> DrawnRun:
     """The run up to where its errors are flat, if they are for at least four fifths of it and it has no window."""
     end = run.span[1]
     if run.window is not None or not end:

@@ -36,7 +36,8 @@ def spectrum(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
         thrust.plot(frequency, positive(densities[:, 0]), color=color, linestyle=dashes)
         if len(runs) == 1:
             for k, (axis, line) in enumerate(zip("xyz", (BLUE, RED, GREEN), strict=True)):
-                torque.plot(frequency, positive(densities[:, k + 1]), color=line, label=axis)
+                thin = (1.0 - 0.25 * k) * style.line  # the lower lines stay visible where they cross
+                torque.plot(frequency, positive(densities[:, k + 1]), color=line, linewidth=thin, label=axis)
         else:
             torque.plot(frequency, positive(densities[:, 1:].sum(axis=1)), color=color, linestyle=dashes)
     all_three = "" if len(runs) == 1 else " (all axes)"
