@@ -11,6 +11,7 @@ from matplotlib.ticker import MultipleLocator
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.results.display_names import signal
 from orchestration.simulation.results.quantities import setting
 from orchestration.theory.stability.frequency import Bode, LoopMargins
 from orchestration.theory.stability.poles import Complexes
@@ -31,7 +32,8 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
         phase = _phase(gain)
-        label = f"{loop.output}: {_sizes(loop)}" if len(result.loops) > 1 else loop.output
+        name = signal(loop.output, {})
+        label = f"{name}: {_sizes(loop)}" if len(result.loops) > 1 else name
         above.plot(result.frequencies, np.abs(gain), label=label, **how)
         middle.plot(result.frequencies, phase, **how)
         below.plot(result.frequencies, np.abs(1.0 / (1.0 + gain)), **how)
@@ -91,7 +93,7 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
     for i, (response, loop) in enumerate(zip(result.responses, result.loops, strict=True)):
         axes.step(
             result.times, response, where="post", color=CYCLE[i % len(CYCLE)], linestyle=DASHES[i % len(DASHES)],
-            label=loop.output,
+            label=signal(loop.output, {}),
         )  # fmt: skip
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
     axes.set(xlabel="time [s]", ylabel="taken back of a step of 1", xlim=(0.0, result.times[-1]))
