@@ -1,4 +1,4 @@
-"""Writes the pictures of a comparison: basins, shares and limits with intervals, fronts."""
+"""The pictures of a comparison: basins, shares and limits with intervals, fronts."""
 
 import itertools
 import re
@@ -20,7 +20,7 @@ from orchestration.experiments.comparison.survival import FATES
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps
-from orchestration.experiments.studies.figures import save
+from orchestration.experiments.studies.figures import made, save
 from orchestration.experiments.studies.shares import GOOD, RANDOM
 from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Floats
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 MAX_PANELS = 6
 
 
+Picture = tuple[str, Callable[[Style], Figure]]
+"""The name of a figure, and what makes it"""
+
+
 def draw(
     comparison: Comparison,
     outcome: Outcome,
@@ -43,31 +47,36 @@ def draw(
     units: Mapping[str, str],
 ) -> list[Path]:
     """Draw all pictures into a folder; their paths. `units` are those of the store, by name of axis and metric."""
-    axis = quantity_of(comparison.axis, units)
-    done, keep = table[table["status"] == "done"], partial(save, style=style, note=note_in(table))
+    note = note_in(table)
+    pictures = _pictures(comparison, outcome, table, units)
+    return [path for name, make in pictures for path in save(make, folder / name, style, note=note)]
+
+
+def figures_of(
+    comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", style: Style, *, units: Mapping[str, str]
+) -> dict[str, Figure]:
+    """The figures of all pictures, by name."""
+    note = note_in(table)
+    return {name: made(make, style, note=note) for name, make in _pictures(comparison, outcome, table, units)}
+
+
+def _pictures(
+    comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", units: Mapping[str, str]
+) -> Iterator[Picture]:
+    axis, done = quantity_of(comparison.axis, units), table[table["status"] == "done"]
     if comparison.second is not None:
-        written = [*_maps(comparison, comparison.second, done, units, folder, keep)]
+        yield from _maps(comparison, comparison.second, done, units)
     else:
-        written = [
-            path
-            for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False)
-            for path in _of_one(comparison, units, outcome, rows, (vehicle, condition), folder, keep)
-        ]
+        for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False):
+            yield from _of_one(comparison, units, outcome, rows, (vehicle, condition))
     if outcome.limits:
         reaches, in_seconds = reaches_of(comparison, outcome.limits), comparison.is_in_seconds
-        written += keep(partial(limits_of, reaches, axis, in_seconds), folder / "limits")
-    return written
+        yield "limits", partial(limits_of, reaches, axis, in_seconds)
 
 
 def _of_one(
-    comparison: Comparison,
-    units: Mapping[str, str],
-    outcome: Outcome,
-    rows: "pd.DataFrame",
-    of: tuple[str, str],
-    folder: Path,
-    keep: Callable[[Callable[[Style], Figure], Path], list[Path]],
-) -> Iterator[Path]:
+    comparison: Comparison, units: Mapping[str, str], outcome: Outcome, rows: "pd.DataFrame", of: tuple[str, str]
+) -> Iterator[Picture]:
     """The pictures of one vehicle under one condition."""
     axis, colors = quantity_of(comparison.axis, units), colors_of([one.name for one in comparison.controllers])
     summaries = [cell for cell in outcome.cells if (cell.vehicle, cell.condition) == of]
@@ -80,24 +89,17 @@ def _of_one(
             for name in colors
             if len(group := rows[rows[CONTROLLER] == name])
         }
-        yield from keep(partial(basins, by_size, axis, fate, title), folder / f"basin_{fate}_{end}")
-    yield from keep(partial(shares, {title: summaries}, axis, colors), folder / f"shares_{end}")
+        yield f"basin_{fate}_{end}", partial(basins, by_size, axis, fate, title)
+    yield f"shares_{end}", partial(shares, {title: summaries}, axis, colors)
     if points:
         values = [*dict.fromkeys(point.value for point in points)]
         shown = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MAX_PANELS))]
         front = comparison.front
         names = tuple(labels.metric_with_unit(metric, units.get(metric)) for metric in (front.effort, front.error))
-        yield from keep(partial(fronts_of, points, shown, axis, names, colors, title), folder / f"front_{end}")
+        yield f"front_{end}", partial(fronts_of, points, shown, axis, names, colors, title)
 
 
-def _maps(
-    comparison: Comparison,
-    second: Axis,
-    done: "pd.DataFrame",
-    units: Mapping[str, str],
-    folder: Path,
-    keep: Callable[[Callable[[Style], Figure], Path], list[Path]],
-) -> Iterator[Path]:
+def _maps(comparison: Comparison, second: Axis, done: "pd.DataFrame", units: Mapping[str, str]) -> Iterator[Picture]:
     """The share that survives, and that settles, over both axes, for each vehicle under each condition of the file."""
     stands_for = {name: one.condition for name, one in comparison.on_second.items()}
     values = {name: one.value for name, one in comparison.on_second.items()}
@@ -107,7 +109,7 @@ def _maps(
         for fate, has in FATES.items():
             repeated = rows.assign(**{GOOD: has(rows), RANDOM: True})  # as initial conditions are drawn
             draw = partial(_map, repeated, (comparison.axis, second), laws, _WORDS[fate], units)
-            yield from keep(draw, folder / f"map_{fate}_{_file_name((vehicle, condition))}")
+            yield f"map_{fate}_{_file_name((vehicle, condition))}", draw
 
 
 _WORDS = {"survive": ("surviving", "diverged"), "settle": ("settled", "not settled")}

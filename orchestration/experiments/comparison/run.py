@@ -36,6 +36,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 if TYPE_CHECKING:
     import pandas as pd
 
+    from orchestration.simulation.figures.gallery import Figures
     from orchestration.simulation.figures.style import Style
 
 
@@ -93,6 +94,19 @@ class Compared:
         return html.card(
             "A comparison", None, None, f"{len(self.outcome.cells)} cells, {self.summary.total} runs", rows
         )
+
+    @explains_missing
+    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
+        """The pictures by name, as `limits` and `shares_VEHICLE_CONDITION`; a notebook shows them.
+
+        `style` sets sizes and fonts. Raises `UsageError` for an unknown style.
+        """
+        from orchestration.experiments.comparison import pictures
+        from orchestration.simulation.figures.gallery import Figures
+        from orchestration.simulation.figures.style import style_named
+
+        chosen, units = style_named(style), units_in(self.summary.path)
+        return Figures(pictures.figures_of(self.comparison, self.outcome, self.table, chosen, units=units), chosen)
 
     @explains_missing
     def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":

@@ -173,10 +173,15 @@ def add_note(figure: Figure, note: str | None) -> None:
 
 def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN, *, note: str | None = None) -> list[Path]:
     """Make a figure in a style, with a note, and write it as `path` with the suffix of each format; the paths."""
+    return write({path.name: made(make, style, note=note)}, path.parent, style)
+
+
+def made(make: Callable[[Style], Figure], style: Style, *, note: str | None) -> Figure:
+    """A figure in a style, with a note."""
     with style.applied():
         figure = make(style)
         add_note(figure, note)
-    return write({path.name: figure}, path.parent, style)
+    return figure
 
 
 def by_horizon(table: "pd.DataFrame") -> str:

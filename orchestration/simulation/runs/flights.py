@@ -1,5 +1,6 @@
 """The results of many runs as arrays by name, and as the tables of pandas and xarray."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -8,6 +9,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import Named
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.simulation.results.objectives import OUTCOME, how_runs_ended
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,6 +47,12 @@ class Flights(Mapping[str, Any]):
     def __len__(self) -> int:
         """The number of arrays."""
         return len(self.arrays)
+
+    @property
+    def verdict(self) -> str:
+        """How many runs have ended in which way; without the output `outcome` only how many there are."""
+        outcomes = Counter(np.asarray(self.arrays.get(OUTCOME, ())).ravel().tolist())
+        return how_runs_ended(outcomes, int(np.prod(self.shape, dtype=int)))
 
     def __repr__(self) -> str:
         return f"<Flights: {np.prod(self.shape, dtype=int)} runs by {self.engine}; {', '.join(self.arrays)}>"

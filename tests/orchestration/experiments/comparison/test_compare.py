@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import quadcosim
 from orchestration.components.fmi.reuse import Instances
 from orchestration.experiments.comparison.cells import CellSummary, Median, Share
 from orchestration.experiments.comparison.run import agree
@@ -111,6 +112,14 @@ def test_nothing_is_run_twice_and_the_result_stays(table: str, folder: Path, mai
     assert document["verdict"].startswith("half of the runs survive over period: coupled to ")
     assert document["verdict"].endswith("; base, nominal (1 more below)")
     assert (folder / "out" / "cells.csv").read_bytes() == before
+
+
+def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
+    native = replace(quadcosim.load_comparison(folder / "small.toml"), native=True)
+    found = quadcosim.compare(native, folder=folder / "out", figures=False, progress=None, announce=None)
+    assert found.summary.flown == 0
+    assert found.verdict.startswith("half of the runs survive over period: coupled to ")
+    assert {*found.plot(style="paper")} == {path.stem for path in (folder / "out").glob("*.png")}
 
 
 def test_a_rerun_of_one_cell_is_what_is_in_the_store(table: str, folder: Path, main: Main) -> None:

@@ -97,6 +97,7 @@ def test_where_no_lanes_can_be_had_the_next_engine_flies_the_same_and_it_is_said
     assert (found.engine, found.reason) == ("compiled", "no compiler")
     assert list(found) == list(lanes)
     assert found["outcome"].tolist() == lanes["outcome"].tolist() == ["bounded", "bounded"]
+    assert found.verdict == lanes.verdict == "2 bounded of 2 runs"
     for name in set(found) - {"outcome"}:
         np.testing.assert_allclose(found[name], lanes[name], rtol=1e-12, atol=1e-15)
 
