@@ -197,7 +197,10 @@ def _expect_period(system: System) -> Fraction:
     expect_fixed_periods(system)
     for name, component in system.components.items():
         if component.partition is not None:
-            raise UsageError(f"{name} is a partition, whose state is that of the whole instance")
+            raise UsageError(
+                f"{name} is a partition, whose state is that of the whole instance: expected the code as one component, "
+                "without partition, whose tasks run when they are due"
+            )
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has its own clock")
     period = hyperperiod_of(system)
