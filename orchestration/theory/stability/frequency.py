@@ -71,7 +71,7 @@ class GainMargin:
     factor: float
     """The factor: below 1 the loop has to keep more of its gain, above 1 it stands no more."""
     frequency: float
-    """Where the loop gain times the factor is -1 [rad/s]; 0: the loop drifts away."""
+    """The frequency at which the loop gain times the factor is -1 [rad/s]; 0: the loop drifts away."""
 
 
 @passable

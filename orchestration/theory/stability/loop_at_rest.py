@@ -198,7 +198,7 @@ def _expect_period(system: System) -> Fraction:
     for name, component in system.components.items():
         if component.partition is not None:
             raise UsageError(
-                f"{name} is a partition, whose state is that of the whole instance: expected the code as one component, "
+                f"{name} is a partition, whose state is that of the whole instance: expected the code as one component "
                 "without partition, whose tasks run when they are due"
             )
         if component.sampling is not None and component.sampling.clock == "fmu":
