@@ -10,6 +10,7 @@ import pytest
 
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.c_names import KEYWORDS
+from fmu_kit.compiler.emit.exchange import described
 from fmu_kit.compiler.emit.standards import STANDARDS
 from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import compiled_here
@@ -132,3 +133,46 @@ def test_embedded_c_has_names_that_are_keywords_of_c(target: Target, tmp_path: P
     seen = tmp_path / "seen.cpp"
     seen.write_text(f'#include <cmath>\n#include <cstdio>\n#include "{source.stem}.h"\n')
     _succeeds([compiler("g++"), "-fsyntax-only", str(seen)])
+
+
+OBSERVING = """from fmu_kit.interface import Input, Output, State
+from fmu_kit.slave import Slave
+
+
+class Observing(Slave):
+    u = Input("rate", "m/s")
+    x = State("position", "m")
+    power = Output("what is observed", "W")
+    continuous_states = ("x",)
+
+    @classmethod
+    def initial_dependencies(cls, output):
+        return {"x": frozenset({"initial.x"})}.get(output)
+
+    def step(self, t, h):
+        self.x = self.x + h * self.u
+        self.power = self.x * self.u
+
+    def derivatives(self, t, since):
+        self.power = self.x * self.u
+        return (self.u,)
+"""
+
+
+def test_an_output_whose_dependencies_are_not_said_may_depend_on_all_states_and_inputs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "observing.py").write_text(OBSERVING, "utf-8")
+    importlib.invalidate_caches()
+    target = Target("observing", "Observing", tmp_path)
+    program = trace(slave_class(target), modules_of(target))
+    for version, state in ((2, "2"), (3, "1")):
+        structure = described(program, STANDARDS[version]).find("ModelStructure")
+        assert structure is not None
+        key = "index" if version == 2 else "valueReference"
+        said = [(each.get(key), each.get("dependencies")) for each in structure.iter() if each.get(key)]
+        power = str(int(state) + 1)
+        assert said[:2] == [(state, state), (power, None)]
+        assert (power, None) in said[2:]
+        assert "" not in dict(said).values()
