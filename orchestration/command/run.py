@@ -139,11 +139,12 @@ def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Res
 
 
 def _metrics(result: "Result") -> CommandResult:
-    from orchestration.simulation.results.objectives import PRINTED
+    from orchestration.simulation.results.objectives import FIXED, PRINTED
 
     of_run: Any = result.provenance
     found = {**result.metrics, **{key: of_run[key] for key in PRINTED if key in of_run}}
-    shown = {name: value for name, value in found.items() if value is not None or not result.metrics["diverged"]}
+    left_out = found if result.metrics["diverged"] else FIXED  # an objective without a value has one in other runs
+    shown = {name: value for name, value in found.items() if value is not None or name not in left_out}
     width, units = max(map(len, shown)), {**result.units, "wall_time": "s", "largest_lateness": "s"}
     lines = []
     for name, value in shown.items():

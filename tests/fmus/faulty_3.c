@@ -71,6 +71,14 @@ void *fmi3InstantiateCoSimulation(Text name, Text token, Text resources, bool vi
                                               environment, log, update);
 }
 
+void *fmi3InstantiateModelExchange(Text name, Text token, Text resources, bool visible, bool logs, void *environment,
+                                   Log log)
+{
+    tell = log;
+    teller = environment;
+    return SOUND(fmi3InstantiateModelExchange)(name, TOKEN, resources, visible, logs, environment, log);
+}
+
 void fmi3FreeInstance(void *c)
 {
     instances--;

@@ -39,7 +39,7 @@ from tests.fmus.damage import (
     without_unknown,
 )
 from tests.fmus.faulty import fault, faulty
-from tests.fmus.stepped_from_outside import BALL, LAW, stepped_from_outside
+from tests.fmus.stepped_from_outside import BALL, JOBS, LAW, stepped_from_outside
 from tests.fmus.verdicts import Verdict, as_markdown, verdicts
 
 PLANT, CONTROLLER = "QuadrotorPlant", "UnifiedController"
@@ -438,6 +438,15 @@ STEPPED_FROM_OUTSIDE = (
     Mutant(
         name="clock without event mode", rule="capabilities", words=("hasEventMode", "r"), model=LAW,
         damage=element("CoSimulation", hasEventMode="false"), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="not finite at a tick", rule="interfaces", words=("event-mode: y = -inf after step 1",), model=LAW,
+        damage=every(variable("u", start="1e308"), variable("w", start="1e308")), keeps_guid=True, versions=(3,),
+    ),
+    Mutant(
+        name="job of a partition not finite", rule="interfaces", model=JOBS,
+        words=("scheduled-execution inClock1: y = nan after step 1",),
+        damage=variable("w", start="-3"), keeps_guid=True, versions=(3,),
     ),
     Mutant(
         name="results of another run", rule="carried-results", words=("gravity = 9.9 in its row 2", "9.81"),

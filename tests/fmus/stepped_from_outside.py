@@ -5,10 +5,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 from tests.fmus.archive import files_of
 from tests.fmus.damage import DESCRIPTION, description, found, handle_of, write_fmu
-from tests.orchestration.components.fmi.exchange import clock, exchange, law
+from tests.orchestration.components.fmi.exchange import clock, exchange, law, partitions
 
-BALL, LAW = "Ball", "Law"
-"""For model exchange; with an input clock, of FMI 3.0"""
+BALL, LAW, JOBS = "Ball", "Law", "Jobs"
+"""For model exchange; with an input clock, and with partitions, of FMI 3.0"""
 _STATES = ("dx1", "dx2")
 
 
@@ -18,6 +18,7 @@ def stepped_from_outside(version: int, folder: Path) -> dict[str, Path]:
     paths = {BALL: exchange(folder / "as_written", "ball", fmi=version)}
     if version == 3:
         paths[LAW] = law(folder / "as_written", clock("r"))
+        paths[JOBS] = partitions(folder / "as_written")
     return {name: _whole(path, folder / f"{name}.fmu") for name, path in paths.items()}
 
 

@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from fmu_kit.archive import SOURCE_HASH_FILE
-from orchestration.components.fmi.access import SCHEDULED
 from orchestration.components.fmi.archive import Archive, UnreadableFmuError
 from orchestration.components.fmi.read_description import attribute, declared_of, kind_of, read_description, starts_of
 from orchestration.components.fmi.slaves import binary_folders
@@ -23,7 +22,7 @@ LIBRARIES = (".so", ".dll", ".dylib")
 
 @dataclass(frozen=True, kw_only=True)
 class Fmu:
-    """An FMU of FMI 2.0 or 3.0 for co-simulation, or for model exchange alone."""
+    """An FMU of FMI 2.0 or 3.0 for co-simulation, or for model exchange or scheduled execution alone."""
 
     archive: Archive
     root: Element
@@ -103,8 +102,6 @@ def read_fmu(archive: Archive, root: Element) -> Fmu:
         fmu = Fmu(archive=archive, root=root, description=read_description(archive.path))
     except UsageError as error:
         raise UnreadableFmuError(str(error).removeprefix(f"{archive.path}: ")) from error
-    if [*declared_of(fmu.description)] == [SCHEDULED]:
-        raise UnreadableFmuError("offers scheduled execution; expected co-simulation or model exchange, to be checked")
     _expect_numbers(fmu)
     return fmu
 

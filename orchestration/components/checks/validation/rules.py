@@ -9,6 +9,7 @@ from orchestration.components.checks.validation import (
     dependencies,
     description,
     exchange_rules,
+    other_interfaces,
     own_rules,
     reference_results,
     refusals,
@@ -32,6 +33,7 @@ OF_RUNS = (*run_rules.RULES, *exchange_rules.OF_RUNS, *reference_results.RULES)
 """Rules that rely on `run_rules.FIRST`"""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
 """Rules for FMUs whose runs can be repeated"""
+OF_OTHER_INTERFACES = other_interfaces.RULES
 LAST_OF_RUNS = run_rules.LAST
 """Only rules of this project come after."""
 
@@ -46,6 +48,7 @@ STANDARD = (
     *run_rules.FIRST,
     *OF_RUNS,
     *OF_EQUAL_RUNS,
+    *OF_OTHER_INTERFACES,
     *LAST_OF_RUNS,
 )
 """Rules for every FMU"""

@@ -12,7 +12,7 @@ from orchestration.components.checks.validation.instance import Row, Value
 from orchestration.components.checks.validation.probe import MIN_STEPS, Probe
 from orchestration.components.checks.validation.run_comparison import same
 from orchestration.components.fmi.instance import start_value
-from orchestration.components.fmi.read_description import Variable
+from orchestration.components.fmi.read_description import Variable, declared_of
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 
@@ -26,7 +26,7 @@ def runs(probe: Probe) -> Iterator[str]:
     if not first.is_complete:
         yield Note(f"slow: {first.steps} steps take {first.seconds:.2g} s; no run has more steps")
     clocked = [v.name for v in probe.fmu.variables if is_clocked(v)]
-    if clocked:
+    if clocked and "event-mode" not in declared_of(probe.fmu.description):
         yield Note(f"{', '.join(clocked)}: not checked, as clocks tick in event mode only, in which it does not run")
     for status, message in dict.fromkeys((status, message) for status, _, message in first.messages):
         if status > WARNING:

@@ -124,11 +124,11 @@ void *fmi3InstantiateScheduledExecution(
     const char *n, const char *token, const char *r, bool v, bool l, void *e, void *log, void *up, void *lock, void *un) {
     return make(token);
 }
-/* A job: what it computes has u, its time, and how many jobs there were. */
+/* A job: what it computes has u, its time, and how many jobs there were; not finite for w < -1. */
 int fmi3ActivateModelPartition(Model *m, uint32_t clock, double t) {
     if (m->mode != 1) return 3;
     m->jobs[clock - CLOCK]++, m->jobs[3]++;
-    m->v[Y] = m->v[U] + t + 1000 * m->jobs[3];
+    m->v[Y] = (m->v[U] + t + 1000 * m->jobs[3]) * sqrt(1 + m->v[W]);
     return 0;
 }
 void fmi3FreeInstance(void *m) { free(m); }

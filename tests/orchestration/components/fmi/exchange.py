@@ -60,6 +60,7 @@ _CLOCKS = """<fmiModelDescription fmiVersion="3.0" modelName="Clocks" instantiat
   <ModelVariables>
     <Float64 name="u" valueReference="5" causality="input" variability="discrete" clocks="30 31" start="0"/>
     <Float64 name="y" valueReference="9" causality="output" variability="discrete" clocks="30 31 32" start="0"/>
+    <Float64 name="w" valueReference="6" causality="input" variability="discrete" clocks="30" start="0"/>
     <Float64 name="p" valueReference="7" causality="parameter" variability="fixed" start="1"/>
     <Int32 name="jobs1" valueReference="40" causality="output" clocks="30"/>
     <Int32 name="jobs2" valueReference="41" causality="output" clocks="31"/>

@@ -99,6 +99,17 @@ def test_rows_of_one_fmu_alone_are_exact(main: Main, old: Path) -> None:
     ]
 
 
+def test_validate_runs_it_and_says_that_it_tries_nothing_else(main: Main, old: Path, library: bytes) -> None:
+    assert main("validate", old).stdout.splitlines() == [
+        "no problems in the FMU",
+        f"{old}: no problems found",
+        "  note: run-of-fmi1: FMI 1.0: its description was read, and it was run; no other rule was tried",
+    ]
+    large = _DESCRIPTION.replace('<Real start="0"/></ScalarVariable>', '<Real start="1e308"/></ScalarVariable>', 1)
+    written(Path("bad.fmu"), library, large)
+    assert "run-of-fmi1: co-simulation: twice = inf after step 1" in main("validate", "bad.fmu", code=1).stdout
+
+
 def test_rows_under_a_sampled_controller_are_exact(main: Main, old: Path) -> None:
     known(small(old.parent))
     Path("system.toml").write_text(_SYSTEM)
