@@ -124,7 +124,10 @@ def test_the_rule_that_is_meant_for_it_finds_the_mutant(version: int, mutant: Mu
     [(2, {"arrays", "clocks", "interfaces"}), (3, {"slave-module", "own-description", "aliases"})],
 )
 def test_every_rule_has_a_mutant_that_it_finds(version: int, without: set[str]) -> None:
-    """FMI 2.0 has no arrays, clocks and event mode, FMI 3.0 has other aliases, and in its FMUs is no Python, as for two rules."""
+    """FMI 2.0 has no arrays, clocks and event mode.
+
+    FMI 3.0 has other aliases, and in its FMUs is no Python, as for two rules.
+    """
     names = {name_of(rule) for rule in (*rules.STANDARD, *rules.OURS)} | {READABLE, PROCESS, PLATFORM}
     assert {mutant.rule_of(version) for of, mutant in OF_VERSIONS if of == version} == names - without
 
