@@ -22,7 +22,7 @@ class PrintedTable:
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]
     numbers: Sequence[Mapping[str, Any]]
-    """what CSV has, by column"""
+    """Numbers of CSV, by column"""
 
 
 def expect_format(form: str | None) -> None:

@@ -12,7 +12,7 @@ from orchestration.simulation.figures import palette, shades
 
 SCRIPTS = (
     "data.js", "words.js", "theme.js", "plots.js", "scene.js", "peaks.js", "timeplots.js", "map.js", "shares.js",
-    "run.js", "tables.js", "page.js",
+    "repeated.js", "run.js", "tables.js", "page.js",
 )  # fmt: skip
 """Scripts in the order of loading; each depends only on those before it"""
 FIGURES = {

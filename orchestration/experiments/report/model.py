@@ -189,6 +189,42 @@ class ComparisonCells:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MapCell:
+    """A cell of a study that repeats."""
+
+    x: float
+    y: float | str
+    value: float
+    """Share, or difference of two shares"""
+    low: Number
+    high: Number
+    """Interval at 95 %, by Wilson or Newcombe; None if nothing is random"""
+    text: str
+    said: str
+    """Sentence of its value and interval"""
+    runs: tuple[int, ...]
+    """Indices of its runs in the design"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellMap:
+    """The cells of a law, or the difference of two."""
+
+    title: str
+    is_difference: bool
+    cells: tuple[MapCell, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatedMaps:
+    """The maps of a study that repeats, over two columns of its table."""
+
+    across: str
+    up: str
+    maps: tuple[CellMap, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class OtherStudy:
     """A second study over the same axes, drawn over the first."""
 
@@ -220,6 +256,7 @@ class Report:
     overall: ReportShare | None = None
     shares: tuple[Shares, ...] = ()
     compared: ComparisonCells | None = None
+    repeated: RepeatedMaps | None = None
     other: OtherStudy | None = None
     contents: tuple[str, ...] = ()
     """sentences: what the file contains and what it omits"""

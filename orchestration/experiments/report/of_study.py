@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
 from orchestration.experiments.report.model import OtherStudy, Report, ReportRun, ReportShare, Setting
+from orchestration.experiments.report.repeated import repeated_maps
 from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
@@ -97,6 +98,7 @@ def study_report(
     by_chance = is_sample(stored, study)
     overall = _overall(stored, study)
     words = words_of(stored, study)
+    repeated = None if study is None or other is not None else repeated_maps(study, stored.rows, axes)
     return Report(
         kind="study",
         title=name,
@@ -115,8 +117,11 @@ def study_report(
         metric=metric,
         overall=overall,
         shares=tuple(
-            along for axis in axes if (along := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
+            along
+            for axis in axes
+            if repeated is None and (along := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
         ),
+        repeated=repeated,
         other=None if other is None else _over(*other, axes=axes, of=name, blobs=blobs),
         contents=tuple(embedded.contents),
         provenance=tuple(provenance_of(stored.about)),

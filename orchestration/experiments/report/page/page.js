@@ -21,17 +21,18 @@ function startPage() {
     later(startRunsTable);
     return;
   }
-  const drawn = report.compared ? startCells() : startMap();
+  const drawn = report.compared ? startCells() : report.repeated ? startRepeated() : startMap();
   drawn.then(() => {
     noteFirstPlot();
     later(openFirst);
-    later(report.compared ? drawSharesOfCells : startShares);
+    later(report.compared ? drawSharesOfCells : report.repeated ? startTableOfRepeated : startShares);
   });
 }
 
 /** The run that is open at first: a good one with signals in the file, if there is one. */
 function openFirst() {
   if (report.compared) return openCell(cellsHere()[0]);
+  if (report.repeated) return openRepeated(firstRepeated());
   return openRow(firstOf([...Array(report.table.count).keys()]));
 }
 

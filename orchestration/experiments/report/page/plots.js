@@ -3,6 +3,8 @@
 
 const VIRIDIS = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
 const CIVIDIS = ["#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838"];
+const DIFFERENCES = ["#8e0b23", "#c2373a", "#e58368", "#f8c4ab", "#f3f4f5", "#b5d5e7", "#6aaccf", "#2f79b4", "#0b3c78"];
+const SCALES = { Viridis: VIRIDIS, Cividis: CIVIDIS, Differences: DIFFERENCES };
 const DASHED = { solid: "", dash: "7 4", dashdot: "7 3 2 3", dot: "2 3", longdash: "11 4", longdashdot: "11 3 2 3" };
 const SHADES_OF_COLOR = 64;
 const NEAR = 24;
@@ -327,13 +329,18 @@ function cellsOf({ x, y }, { x: across, y: up, z, zmin, zmax, colorscale, colors
   const words = [];
   z.forEach((row, i) => row.forEach((value, j) => {
     if (value === null || !Number.isFinite(value)) return;
-    const color = colors ? colors[value] : shadeOfValue(colorscale === "Cividis" ? CIVIDIS : VIRIDIS, value, zmin, zmax);
+    const color = colors ? colors[value] : shadeOfValue(SCALES[colorscale], value, zmin, zmax);
     if (color === null) return;
     const key = JSON.stringify([color, Boolean(faded?.[i][j])]);
     groups.set(key, `${groups.get(key) ?? ""}M${(xs[j] + gap / 2).toFixed(1)} ${(ys[i] - gap / 2).toFixed(1)}H${(xs[j + 1] - gap / 2).toFixed(1)}V${(ys[i + 1] + gap / 2).toFixed(1)}H${(xs[j] + gap / 2).toFixed(1)}Z`);
-    if (text?.[i][j]) words.push(svg("text", { x: (xs[j] + xs[j + 1]) / 2, y: (ys[i] + ys[i + 1]) / 2 + 4, "text-anchor": "middle", "font-size": 11, fill: (value - zmin) / (zmax - zmin) > 0.55 ? "#111" : "#fff" }, text[i][j]));
+    if (text?.[i][j]) words.push(svg("text", { x: (xs[j] + xs[j + 1]) / 2, y: (ys[i] + ys[i + 1]) / 2 + 4, "text-anchor": "middle", "font-size": 11, fill: isLight(colorscale, (value - zmin) / (zmax - zmin)) ? "#111" : "#fff" }, text[i][j]));
   }));
   return [...[...groups].map(([key, d]) => svg("path", { d, fill: JSON.parse(key)[0], opacity: JSON.parse(key)[1] ? 0.25 : null })), ...words];
+}
+
+/** Whether a colour is so light that words on it are dark; `share` is its place in the scale. */
+function isLight(colorscale, share) {
+  return colorscale === "Differences" ? Math.abs(share - 0.5) < 0.3 : share > 0.55;
 }
 
 // -- beside the axes --------------------------------------------------------------------------------------
@@ -395,8 +402,9 @@ function barOf({ width, height, margin }, trace) {
   if (trace.showscale === false) return null;
   const [low, high] = trace.colorbar ? [trace.zmin, trace.zmax] : [trace.marker.cmin, trace.marker.cmax];
   const isFlat = bar.orientation === "h";
-  const scale = trace.colorscale === "Cividis" ? CIVIDIS : VIRIDIS;
-  const id = `shades-${scale === CIVIDIS ? "share" : "value"}`;
+  const name = trace.colorscale ?? "Viridis";
+  const scale = SCALES[name];
+  const id = `shades-${name}`;
   const stops = scale.map((color, i) => svg("stop", { offset: i / (scale.length - 1), "stop-color": color }));
   const box = isFlat ? { x: margin.l, y: height - 44, width: width - margin.l - margin.r, height: 12 } : { x: width - margin.r + 14, y: margin.t, width: 14, height: height - margin.t - margin.b };
   const axis = { ends: [low, high], at: isFlat ? [box.x, box.x + box.width] : [box.y + box.height, box.y], id: isFlat ? "x" : "y", nticks: 6, tickformat: bar.tickformat, tickvals: bar.tickvals, ticktext: bar.ticktext };

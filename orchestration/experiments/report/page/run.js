@@ -99,7 +99,7 @@ function openIndex(index) {
 function openRow(row) {
   if (row === null || row === undefined) return;
   openRun(runOfRow(row) ?? null, row);
-  if (report.compared) markInCell(row);
+  if (report.compared || report.repeated) markInCell(row);
   else markOnMap(row);
 }
 

@@ -362,6 +362,32 @@ def test_an_axis_of_words_has_a_tick_for_each_and_its_cells_fill_the_map(show: S
     page.close()
 
 
+def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_seeds_folded(
+    show: Show, tmp_path: Path
+) -> None:
+    file = tmp_path / "laws.toml"
+    file.write_text(
+        '[base]\nstop_time = 0.02\n[base.timing]\nplant_interval = 0.005\n[design]\nrepeat = "seed"\n'
+        '[[axes]]\nname = "controller"\nvalues = ["UnifiedController", "CascadedController"]\n'
+        '[[axes]]\nname = "timing.period"\nvalues = [0.01, 0.02]\n'
+        '[[axes]]\nname = "timing.loss"\nvalues = [0.0, 0.5]\n[[axes]]\nname = "seed"\nvalues = [1, 2]\n'
+    )
+    sweep(load_study(file), folder=tmp_path)
+    page = show(report(file, out=tmp_path, flights=16))
+    chosen = page.locator("#map-controls select")
+    opened = chosen.evaluate("select => select.selectedOptions[0].textContent")
+    assert opened == "difference, CascadedController minus UnifiedController"
+    assert page.inner_text("#cell-title") == "period 10 ms, loss 0.5"
+    assert page.get_by_label("4 of the cell").is_visible()  # two seeds of two laws
+    chosen.select_option("0")
+    assert page.get_by_label("2 of the cell").is_visible()
+    page.locator("#map-plot").press("ArrowRight")
+    wait_for(page, "document.getElementById('cell-title').textContent === 'period 20 ms, loss 0.5'")
+    assert "0 of 2 settled: 0 %, 95 % interval 0 % to 66 %" in page.inner_text("#cell-text")
+    assert {"0/2", "0 %"} <= {*page.locator("#map-plot text").all_text_contents()}
+    page.close()
+
+
 def test_where_nothing_moves_there_is_no_button_to_play_it(show: Show, tmp_path: Path) -> None:
     servo = changed(load_system(EXAMPLES / "double_integrator" / "system.toml"), {"stop_time": 1.0})
     page = show(report(run(servo), out=tmp_path / "report.html"))

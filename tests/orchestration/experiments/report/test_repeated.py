@@ -1,0 +1,58 @@
+"""Maps of a study that repeats, in its report: they fold the seeds, and end with the difference of two laws."""
+
+from typing import Any
+
+from orchestration.experiments.report.model import CellMap, MapCell
+from orchestration.experiments.report.repeated import repeated_maps
+from orchestration.experiments.report.tables import ColumnAxis
+from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.shares import interval_of_difference
+from orchestration.experiments.studies.study import Study
+from orchestration.foundation.basics.statistics import wilson
+from tests.orchestration.experiments.studies.common import axis, study
+
+LAWS = axis("controller", "UnifiedController", "CascadedController")
+PERIODS, LOSSES, SEEDS = axis("timing.period", 0.01, 0.02), axis("timing.loss", 0.0, 0.1), axis("seed", 1, 2, 3)
+
+
+def maps_of(chosen: Study) -> tuple[CellMap, ...] | None:
+    """The maps where the second law is good at 10 ms without loss alone, and the first everywhere."""
+    rows: list[dict[str, Any]] = []
+    for i in range(len(chosen.points)):
+        point = chosen.points[i]
+        good = point.get("controller") != "CascadedController" or (point["timing.period"], point["timing.loss"]) == (
+            0.01,
+            0.0,
+        )
+        rows.append({"design_index": i, "settings": point, "status": "done", "good": int(good)})
+    axes = [ColumnAxis(name=each.name, quantity=quantity_of(each, {"timing.period": "s"})) for each in chosen.axes]
+    found = repeated_maps(chosen, rows, axes)
+    return None if found is None else found.maps
+
+
+def cell(of: CellMap, x: float, y: float) -> MapCell:
+    (found,) = [one for one in of.cells if (one.x, one.y) == (x, y)]
+    return found
+
+
+def test_two_laws_have_a_map_each_and_one_of_their_difference() -> None:
+    maps = maps_of(study(LAWS, PERIODS, LOSSES, SEEDS, repeat="seed"))
+    assert maps is not None
+    first, second, difference = maps
+    assert difference.title == "difference, CascadedController minus UnifiedController"
+    assert [one.is_difference for one in maps] == [False, False, True]
+    lossy = cell(second, 20.0, 0.1)
+    assert (lossy.text, lossy.value, (lossy.low, lossy.high)) == ("0/3", 0.0, wilson(0, 3))
+    assert lossy.runs == (21, 22, 23)
+    assert lossy.said == "0 of 3 settled: 0 %, 95 % interval 0 % to 56 %"
+    exact = cell(first, 10.0, 0.0)
+    assert (exact.text, exact.low, exact.said) == ("100 %", None, "3 of 3 settled: 100 %, nothing is random")
+    apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(3, 3))
+    shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 1.0), ends)]
+    assert (apart.low, apart.high) == interval_of_difference(*shares)
+    assert apart.runs == (9, 10, 11, 21, 22, 23)
+
+
+def test_other_studies_keep_the_map_of_their_runs() -> None:
+    assert maps_of(study(PERIODS, LOSSES, SEEDS)) is None
+    assert maps_of(study(PERIODS, axis("timing.loss", 0.0), axis("timing.jitter", 0.0), SEEDS, repeat="seed")) is None
