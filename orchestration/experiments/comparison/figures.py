@@ -231,7 +231,7 @@ _LINES: Mapping[str, Mapping[str, Any]] = {
     "survive": {"markersize": _SIZE},
     "settle": {"markersize": _SIZE, "markerfacecolor": "white", "linewidth": 0.7},
 }
-"""What the two lines of a controller differ in"""
+"""The differences between the two lines of a controller"""
 
 
 def _shares_of(panel: Axes, axis: Quantity, group: Sequence[CellSummary], look: Mapping[str, Any]) -> None:
