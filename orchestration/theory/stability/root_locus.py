@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -151,22 +150,21 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
             return float(np.abs(found[value][0]).max(initial=0.0))
 
-        radii = []
+        radii, crossings = list[float](), list[Crossing]()
         with progress_bar("poles") as report:
-            for done, value in enumerate(values, 1):
-                radii.append(radius(value))
-                report(done / len(values))
-        crossings = []
-        for (low, before), (high, after) in pairwise(zip(values, radii, strict=True)):
-            if (before < 1.0) == (after < 1.0):
-                continue
-            at = zero_between(
-                lambda value: radius(value) - 1.0,
-                lambda value: _short(value, unit),
-                (low, before - 1.0),
-                (high, after - 1.0),
-            )
-            crossings.append(_crossing(at, *found[at], leaves=before < 1.0))
+            # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
+            for place in range(len(values) - 1, -1, -1):
+                radii.insert(0, radius(values[place]))
+                report(1.0 - place / len(values))
+                if len(radii) < 2 or (radii[0] < 1.0) == (radii[1] < 1.0):
+                    continue
+                at = zero_between(
+                    lambda value: radius(value) - 1.0,
+                    lambda value: _short(value, unit),
+                    (values[place], radii[0] - 1.0),
+                    (values[place + 1], radii[1] - 1.0),
+                )
+                crossings.insert(0, _crossing(at, *found[at], leaves=radii[0] < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
     for row, known_poles in zip(poles, each, strict=True):
