@@ -93,6 +93,8 @@ def _kind_of(start: Any) -> _Kind:
     if isinstance(start, tuple) and hasattr(start, "_fields"):
         return _named(type(start), start._fields)
     expected = "a number, a truth value, a member of an IntEnum, a Vec3, a Quaternion, an Inertia or a NamedTuple"
+    if isinstance(start, (list, tuple)):
+        expected += f"; in place of a list a class Row(NamedTuple) with {len(start)} fields of type float"
     raise TypeError(f"start = {start!r}: expected {expected}")
 
 

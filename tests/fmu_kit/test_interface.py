@@ -310,6 +310,11 @@ def test_a_start_that_no_variable_can_have_is_refused_where_it_is_written(start)
         Input("measured", "m", start)
 
 
+def test_a_list_is_told_what_to_write_instead():
+    with pytest.raises(TypeError, match=r"in place of a list a class Row\(NamedTuple\) with 2 fields of type float$"):
+        Parameter("gains", "1", [1.0, 2.0])
+
+
 def test_without_author_and_licence_an_fmu_says_nothing_of_them():
     assert not {"author", "license", "copyright"} & Law.to_xml(Law()).attrib.keys()
     theirs: Any = type("Theirs", (Law,), {"author": "Ada", "license": "MIT", "copyright": "Ada, 2026"})
