@@ -171,8 +171,9 @@ def test_tasks_are_paused_whole_and_have_limits(parts: Path, main: Main) -> None
 
 
 def test_a_loop_of_code_of_two_rates_has_the_poles_and_margins_of_a_map_made_by_hand(parts: Path) -> None:
-    """The position every 0.25 s, the speed every 0.05 s: five samples are a period of the loop."""
+    """The speed every 0.05 s, then the position every 0.25 s: five samples are a period, which begins with a state."""
     tasks = TWO_TASKS.replace('"position_task"\nperiod = 0.05', '"position_task"\nperiod = 0.25')
+    tasks = "".join(f"[[tasks]]{task}" for task in reversed(tasks.split("[[tasks]]")[1:]))
     (parts / "rates.toml").write_text(IN_TWO.format(period="", steps=tasks))
     file = parts / "rates_system.toml"
     file.write_text((parts / "one_step.toml").read_text().replace("one.toml", "rates.toml"))
@@ -181,11 +182,10 @@ def test_a_loop_of_code_of_two_rates_has_the_poles_and_margins_of_a_map_made_by_
         """Of x, v, what the position task wants, and commands on the way, over a period, with a factor on commands."""
         whole, h = np.eye(3 + late, dtype=complex), 0.05
         for k in range(5):
-            if k == 0:
-                whole[2] = -whole[0]
             sent = np.vstack([whole[3:], factor * (whole[2] - whole[1])])
             x, v, u = whole[0], whole[1], sent[0]
-            whole = np.vstack([x + h * v + 0.5 * h * h * u, v + h * u, whole[2], sent[1:]])
+            wanted = -x if k == 0 else whole[2]
+            whole = np.vstack([x + h * v + 0.5 * h * h * u, v + h * u, wanted, sent[1:]])
         return whole
 
     def radius(factor: complex, late: int = 0) -> float:
