@@ -9,7 +9,6 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import hypothesis
 import pytest
@@ -21,7 +20,7 @@ from orchestration.components.building import builder, fmus
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics import terminal
 from tests.commands import Done, Main
-from tests.extent import each_choice, tries
+from tests.extent import tries
 from tests.fmus.making import MAKINGS, Making
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=tries(60, sampled=10))
@@ -80,34 +79,11 @@ LONGEST = (
 gc.disable()  # while thousands of tests are collected, of which none is garbage
 
 
-LEFT_OUT = pytest.StashKey[int]()
-
-
 @pytest.hookimpl(tryfirst=True)  # fixtures of the session group what is in one process
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """The longest files begin first; of several parameters each value is there, not each combination."""
-    whole = len(items)
-    items[:] = each_choice(items)
-    config.stash[LEFT_OUT] = whole - len(items)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files begin first."""
     rank = {DATA.parent / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path, len(rank)))
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """A parallel process tells the one that sums up."""
-    getattr(session.config, "workeroutput", {})["left out"] = session.config.stash.get(LEFT_OUT, 0)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node: Any) -> None:
-    """All of them have left out the same; one that crashed says nothing."""
-    node.config.stash[LEFT_OUT] = getattr(node, "workeroutput", {}).get("left out", 0)
-
-
-def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """What was sampled is said."""
-    if left_out := config.stash.get(LEFT_OUT, 0):
-        terminalreporter.write_line(f"{left_out} combinations of parameters are left to make test-all")
 
 
 def pytest_collection_finish() -> None:
