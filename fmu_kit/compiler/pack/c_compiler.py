@@ -88,13 +88,20 @@ def compiler() -> str:
 
 
 def compiled_here(
-    sources: Mapping[str, bytes], main: str, *, mathematics: Mathematics = "own", options: Sequence[str] = ()
+    sources: Mapping[str, bytes],
+    main: str,
+    *,
+    mathematics: Mathematics = "own",
+    options: Sequence[str] = (),
+    has_lines: bool = False,
 ) -> bytes:
     """The library for this machine, compiled from the file `main` among the sources by its compiler `cc`.
 
+    If it `has_lines`, those of objects among the sources are kept, by which a crash is found.
     Raises `PackagingError` without a compiler.
     """
-    return _compiled([compiler(), *OPTIONS, *_LINUX, *options], sources, main, _MATHEMATICS[mathematics])
+    options = [option for option in (*OPTIONS, *_LINUX, *options) if option != "-s" or not has_lines]
+    return _compiled([compiler(), *options], sources, main, _MATHEMATICS[mathematics])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from fmu_kit.compiler.pack.c_compiler import compiler, output_of
 SECTION = "quadcosim_state"
 _OPTIONS = (
     *("-O2", "-g1", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-strict-aliasing", "-fno-common"),
-    *("-U_FORTIFY_SOURCE", "-fdiagnostics-color=never"),
+    *("-U_FORTIFY_SOURCE", "-fdiagnostics-color=never", "-gno-record-gcc-switches"),
 )
 _LIBRARY = (".a", ".o")
 """Endings of sources that are compiled already, such as static libraries of Rust"""
@@ -93,13 +93,13 @@ def build_objects(code: UserCode, user: Path, folder: Path) -> Objects:
             read.append(str(path))
             continue
         target = folder / f"{number}.o"
-        _run(code, [*_compiler_of(path), *_options(code), "-MMD", "-c", path, "-o", target], folder)
+        _run(code, [*_compiler_of(path), *_options(code, folder), "-MMD", "-c", path, "-o", target], folder)
         read += [name for name in _prerequisites(target.with_suffix(".d")) if name != str(user)]
         compiled.append(target)
     joined = folder / "joined.o"
     _run(code, ["ld", "-r", "--force-group-allocation", "-o", joined, *compiled, *libraries], folder)
     is_pure = _expect_usable(code, joined, folder)
-    path, size = _with_one_section(joined, folder)
+    path, size = _with_one_section(joined, folder, has_lines=not libraries)
     relative = tuple(dict.fromkeys(str(Path(code.folder, name).resolve()) for name in read))
     return Objects(path=path, state_bytes=size, is_pure=is_pure, read=relative)
 
@@ -119,9 +119,11 @@ def _compiler_of(source: Path) -> list[str]:
     return [cxx, "-std=gnu++17", "-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics"]
 
 
-def _options(code: UserCode) -> list[str]:
+def _options(code: UserCode, folder: Path) -> list[str]:
     include = [f"-I{Path(code.folder, path).resolve()}" for path in code.include]
-    return [*_OPTIONS, *include, *(f"-D{define}" for define in code.defines)]
+    # The same bytes wherever the code is and wherever it is compiled.
+    named = [f"-ffile-prefix-map={path}=." for path in (code.folder, Path(code.folder).resolve(), folder.resolve())]
+    return [*_OPTIONS, *named, *include, *(f"-D{define}" for define in code.defines)]
 
 
 def _prerequisites(rule: Path) -> list[str]:
@@ -164,9 +166,10 @@ def _refusal(symbol: str, where: str) -> str:
     )
 
 
-def _with_one_section(joined: Path, folder: Path) -> tuple[Path, int]:
+def _with_one_section(joined: Path, folder: Path, *, has_lines: bool) -> tuple[Path, int]:
     """The objects with all sections that code can write as one, and its size [bytes].
 
+    With their lines, by which a crash is found, unless there are libraries: theirs have paths of other machines.
     Constants that the loader relocates, and lists of functions that run before and after, are no state.
     """
     lines = output_of(["objdump", "-h", "-w", str(joined)], folder).splitlines()
@@ -181,7 +184,8 @@ def _with_one_section(joined: Path, folder: Path) -> tuple[Path, int]:
     output_of(["objcopy", *renamed, str(joined), "renamed.o"], folder)
     output_of(["ld", "-r", "-o", "code.o", "renamed.o"], folder)
     # Names of the code are its own: a stub of printf is not that of whoever is linked with it.
-    output_of(["objcopy", "--strip-debug", "--wildcard", "--keep-global-symbol=quadcosim_*", "code.o"], folder)
+    stripped = [] if has_lines else ["--strip-debug"]
+    output_of(["objcopy", *stripped, "--wildcard", "--keep-global-symbol=quadcosim_*", "code.o"], folder)
     return folder / "code.o", _size_of(folder / "code.o", folder)
 
 

@@ -115,7 +115,7 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
 
 def _library(code: UserCode, sources: Mapping[str, bytes], main: str) -> bytes:
     options = [*c_compiler.OF_LIBRARY, "-Wl,-Bsymbolic", "-Wl,-z,defs", "code.o", *libraries(code)]
-    return c_compiler.compiled_here(sources, main, options=options)
+    return c_compiler.compiled_here(sources, main, options=options, has_lines=True)
 
 
 def _starts(code: UserCode, objects: Objects, folder: Path) -> list[float]:

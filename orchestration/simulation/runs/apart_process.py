@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.fmi.access import USUAL, Access
+from orchestration.components.fmi.crashes import report_crashes
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.opening import open_instance
 from orchestration.foundation.processes.channel import Parent
@@ -68,6 +69,7 @@ def main(folder: str) -> None:
     reporter = _Reporter(parent)
     _MESSAGES.handlers[:] = [reporter]
     _MESSAGES.setLevel(order.level)
+    report_crashes(lambda place: reporter.report("crash", place))
     try:
         _simulate(order, reporter, Path(folder))
     except BaseException as error:

@@ -26,7 +26,7 @@ from orchestration.systems.system.request import Request
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0
 """Time in which the process must end after its last message [s]"""
-_REPORTS = ("describe", "begin", "take", "share", "message", "stage", "outcome", "error", "end")
+_REPORTS = ("describe", "begin", "take", "share", "message", "stage", "outcome", "error", "crash", "end")
 """Methods of `_Receiver` that a message may name"""
 
 
@@ -92,6 +92,8 @@ class _Receiver:
         """Activity of the process"""
         self.components: Sequence[str] = ()
         """whose FMUs may be called meanwhile"""
+        self.place = ""
+        """Where the C of an FMU has crashed, if that is known"""
         self.columns: tuple[str, ...] = ()
         self.recorded_until = -1.0
         """Time up to which rows are recorded [s]"""
@@ -139,6 +141,9 @@ class _Receiver:
     def error(self, error: BaseException) -> None:
         raise error
 
+    def crash(self, place: str) -> None:
+        self.place = place
+
     def end(self) -> None:
         """The last message."""
 
@@ -162,6 +167,8 @@ def _lost(resolved: ResolvedRequest, receiver: _Receiver, folder: Path, ending: 
     where = (
         "" if not fmus else f", {activity} {fmus[0]}" if len(fmus) == 1 else f", {activity} one of {', '.join(fmus)}"
     )
+    if receiver.place:
+        where = f"{where}, at {receiver.place}"
     if end < 0.0:
         raise RunLost(f"the process of the run {ending}{where}")
     text = f"the process of the run {ending}{where}, after t = {end:g} s of {resolved.system.stop_time:g} s"

@@ -287,17 +287,22 @@ def test_a_law_exported_to_c_and_wrapped_again_flies_the_same_bits(name: str, ex
     assert np.ptp(one.signals["plant.position.x"]) > 0.01
 
 
-def test_a_crash_in_the_c_is_one_line_with_its_signal(integrator: Path, main: Main) -> None:
-    file = integrator.parent / "pd.toml"
-    step = "static int n; if (n++ == 3) *(volatile int *)0 = 1; pd_step(&in, &out);"
-    (integrator.parent / "bad.toml").write_text(
-        file.read_text().replace("pd_step(&in, &out);", step).replace('"Pd"', '"Bad"')
-    )
-    text = integrator.read_text().replace("pd.toml", "bad.toml")
-    (integrator.parent / "bad_system.toml").write_text(text)
-    done = main("run", integrator.parent / "bad_system.toml", "--build", code=1)
-    (line,) = [line for line in done.stderr.splitlines() if line.startswith("quadcosim:")]
-    assert "SIGSEGV" in line
+def test_a_crash_in_the_c_is_one_line_with_its_signal_and_its_place(integrator: Path, main: Main) -> None:
+    file, step = integrator.with_name("pd.toml"), "pd_step(&in, &out);"
+    file.with_name("bad.c").write_text("int pd_n;\n\nvoid pd_bad(volatile int *to)\n{\n    *to = pd_n;\n}\n")
+    changes = {
+        "extern void pd_bad(volatile int *); if (n++ == 3) pd_bad(0);": "bad.c:5 (pd_bad)",
+        "static char *none; if (n++ == 3) { __builtin_memcpy(none, &n, 99999); n = 0; }": "bad.toml:8",
+        "static void (*none)(void); if (n++ == 3) { none(); n = 0; }": "bad.toml:8",
+    }
+    for change, place in changes.items():
+        text = file.read_text().replace(step, f"static int n; {change} {step}").replace('"Pd"', '"Bad"')
+        file.with_name("bad.toml").write_text(text.replace('"pd.c"', '"pd.c", "bad.c"'))
+        system = integrator.with_name("bad_system.toml")
+        system.write_text(integrator.read_text().replace("pd.toml", "bad.toml"))
+        done = main("run", system, "--build", code=1)
+        (line,) = [line for line in done.stderr.splitlines() if line.startswith("quadcosim:")]
+        assert f"SIGSEGV, in a call of controller (Bad), at {place}, after t = " in line
 
 
 @pytest.fixture(scope="module")
