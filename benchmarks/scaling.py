@@ -26,6 +26,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 
 SIZES = (2, 4, 10, 20, 50, 100, 200)
+FITTED = "fitted: a constant, and so much each"
 INSTANTS = 200
 REPETITIONS = 9
 MILLISECOND = 1e-3
@@ -132,10 +133,12 @@ def _measured(made: Mapping[str, Callable[[int], System]]) -> Figure:
         print(f"{what}: {slope:.2f} µs each and {constant:.1f} µs; from 10 to 200 as the power {exponent:.2f}")
         for size, value in zip(SIZES, found, strict=True):
             print(f"{size:>6} {value:10.1f} µs an instant {value / size:8.2f} µs each")
-        axes.loglog(SIZES, slope * np.array(SIZES) + constant, color=GREY, linewidth=1.0, zorder=1)
+        line = slope * np.array(SIZES) + constant
+        axes.loglog(SIZES, line, color=GREY, linewidth=1.0, zorder=1, label="_" if axes.lines else FITTED)
         axes.loglog(SIZES, found, mark, label=f"{what}: {slope:.2f} µs each")
     axes.set(xlabel="how many", ylabel="the master's cost of an instant [µs]")
-    axes.legend()
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend([*handles[1:], handles[0]], [*labels[1:], labels[0]])
     plain(axes.xaxis)
     plain(axes.yaxis)
     return figure

@@ -24,6 +24,7 @@ from orchestration.simulation.engines.wasm.settings import Setting
 from orchestration.simulation.engines.wasm.tables_of_system import SystemTables, tables_of
 from orchestration.simulation.requests.ranges import unit_at
 from orchestration.simulation.requests.request import RequestLike, default_request, request_of
+from orchestration.simulation.results.display_names import signal
 from orchestration.simulation.results.objectives import GOOD
 from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.runs.many_runs import located
@@ -244,6 +245,7 @@ def _document(
         "title": request.headline() or (name or "a system"), "name": name, "kind": request.kind,
         "settings": [[s.path, s.value, s.low, s.high, int(s.excludes_low)] for s in tables.settings.all],
         "targets": targets, "sliders": sliders, "map": chosen.map, "measure": _measure(system, chosen),
+        "names": {column: signal(column, described) for column in columns},
         "columns": [[column, *map(int, shape.place(column)), described[column].unit or ""] for column in columns],
         "seen": seen, "objectives": [*shape.nodes], "good": [*shape.nodes].index(GOOD) if GOOD in shape.nodes else -1,
         "units": dict(units), "fixed": given and f"{given}: the timing is that of the file, and has no sliders",

@@ -33,7 +33,7 @@ def commands(runs: Sequence[DrawnRun], style: Style) -> Figure:
     for row, name in zip(rows, COMMAND, strict=True):
         for panel, span in zip(row, spans, strict=True):
             is_zoom = panel is not row[0] or (len(spans) == 1 and window is not None)
-            _draw(panel, runs, name, span, style, clips=not is_zoom)
+            _draw(panel, runs, name, span, style, clips=not is_zoom, beside=zoom if len(spans) > 1 else None)
             if is_zoom and len(runs) == 1:
                 mark_events(panel, runs[0], span)
         row[0].set_ylabel(quantity(NAMES[name], UNITS[name]))
@@ -50,8 +50,10 @@ def commands(runs: Sequence[DrawnRun], style: Style) -> Figure:
     return figure
 
 
-def _draw(panel: Axes, runs: Sequence[DrawnRun], name: str, span: Window, style: Style, *, clips: bool) -> None:
-    """One command over one span, with the limits that are near."""
+def _draw(
+    panel: Axes, runs: Sequence[DrawnRun], name: str, span: Window, style: Style, *, clips: bool, beside: Window | None
+) -> None:
+    """One command over one span, with the limits that are near; `beside`: the window of the panel beside it."""
     lines = []
     for run in runs:
         t, values = run.signals["time"], run.signals[f"plant.{name}"]
@@ -64,7 +66,7 @@ def _draw(panel: Axes, runs: Sequence[DrawnRun], name: str, span: Window, style:
     low, high = min(float(y.min()) for _, y in lines), max(float(y.max()) for _, y in lines)
     room = (high - low) or 1.0  # below for samples and arrivals, above for losses
     panel.set_ylim(low - (0.1 if clips else 0.25) * room, high + 0.15 * room)
-    if not (clips and clip_peaks(panel, lines, UNITS[name], style)):
+    if not (clips and clip_peaks(panel, lines, UNITS[name], style, beside)):
         _mark_limits(panel, runs, name)
     _mark_saturation(panel, runs, name)
 

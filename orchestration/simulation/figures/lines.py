@@ -102,11 +102,12 @@ def wrapped(label: str, width: int = 24) -> str:
     return "\n".join(textwrap.wrap(label.replace(" [", "\u00a0["), width, break_long_words=False))
 
 
-def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
-    """Clip short peaks that would hide the rest of the signals, and show them in an inset with a note.
+def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style, beside: Window | None = None) -> bool:
+    """Clip short peaks that would hide the rest of the signals, with a note, and show them in an inset.
 
-    `lines` are those drawn on `axes`, with all rows; returns whether anything was clipped: not where peaks are spread
-    over the run, as an inset of all of it would show no more than the axes.
+    There is no inset of peaks `beside` the axes, in the window of another panel. `lines` are those drawn on `axes`,
+    with all rows; returns whether anything was clipped: not where peaks are spread over the run, as an inset of all of
+    it would show no more than the axes.
     """
     inner = [_without_peaks(t, y) for t, y in lines if len(t) > 1 and np.isfinite(y).any()]
     if not inner:
@@ -120,8 +121,17 @@ def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style) -> bool:
     if np.ptp(outside) > SPREAD * (axes.get_xlim()[1] - axes.get_xlim()[0]):
         return False
     seen = (max(bottom, low - room) if bottom >= low - room else low - room, min(top, high + room))
-    axes.set_ylim(seen[0] - 0.05 * (seen[1] - seen[0]), seen[1] + 0.9 * (seen[1] - seen[0]))
-    _inset(axes, lines, outside, unit, style)
+    is_beside = beside is not None and beside[0] <= outside.min() and outside.max() <= beside[1]
+    over = 0.35 if is_beside else 1.3  # room for the note, or for the inset with its numbers
+    axes.set_ylim(seen[0] - 0.05 * (seen[1] - seen[0]), seen[1] + over * (seen[1] - seen[0]))
+    t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
+    k = int(np.nanargmax(np.abs(y)))
+    note = f"clipped: peak {labels.amount(float(y[k]), unit)} at {t[k]:.3g} s".replace("-", "−")
+    if is_beside:
+        how: Any = {"transform": axes.transAxes, "ha": "right", "va": "top"}
+        axes.text(0.98, 0.96, note, fontsize=0.8 * style.font, color=BLACK, **how)
+    else:
+        _inset(axes, lines, outside, note, style)
     return True
 
 
@@ -138,10 +148,8 @@ def _without_peaks(t: Floats, values: Floats) -> tuple[float, float]:
     return float(values[order[min(low, len(order) - 1)]]), float(values[order[min(high, len(order) - 1)]])
 
 
-def _inset(axes: Axes, lines: Lines, outside: Floats, unit: str, style: Style) -> None:
-    """The time span of the peaks, whose times are `outside`, in the upper right; the title states the largest."""
-    t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
-    k = int(np.nanargmax(np.abs(y)))
+def _inset(axes: Axes, lines: Lines, outside: Floats, note: str, style: Style) -> None:
+    """The time span of the peaks, whose times are `outside`, in the upper right, with the note as its title."""
     span = axes.get_xlim()[1] - axes.get_xlim()[0]
     width = max(float(np.ptp(outside)), 0.01 * span)
     inset = axes.inset_axes((0.42, 0.5, 0.56, 0.48), label="peak")
@@ -157,9 +165,6 @@ def _inset(axes: Axes, lines: Lines, outside: Floats, unit: str, style: Style) -
     inset.tick_params(labelsize=0.7 * style.font, length=0.2 * style.font, pad=0.15 * style.font)
     inset.locator_params(nbins=4)
     inset.set_in_layout(False)  # it lies inside
-    inset.set_title(
-        f"clipped: peak {labels.amount(float(y[k]), unit)} at {t[k]:.3g} s".replace("-", "−"),
-        fontsize=0.8 * style.font, color=BLACK, pad=0.2 * style.font,
-    )  # fmt: skip
+    inset.set_title(note, fontsize=0.8 * style.font, color=BLACK, pad=0.2 * style.font)
     for side in inset.spines.values():
         side.set(visible=True, color=GREY, linewidth=0.05 * style.font)

@@ -75,11 +75,10 @@ class Region:
             axes.stairs(
                 heights, [0.0, *(a for a, _ in certified[1:])], fill=True, color=BLUE, alpha=0.25, label="certified"
             )
-        axes.plot([a for a, _ in certified], [b for _, b in certified], ".", color=BLUE)
+        axes.plot([a for a, _ in certified], [b for _, b in certified], ".", color=BLUE, clip_on=False)
         if self.breaking:
-            axes.plot(
-                *zip(*[(1e3 * a, 1e3 * b) for a, b in self.breaking]), "x-", color=RED, label="a sequence breaks it"
-            )
+            broken = zip(*[(1e3 * a, 1e3 * b) for a, b in self.breaking])
+            axes.plot(*broken, "x-", color=RED, label="a sequence breaks it", clip_on=False)
         across, up = (labels.with_unit(labels.setting(path), "ms") for path in self.of)
         axes.set(xlabel=across, ylabel=up, xlim=(0.0, None), ylim=(0.0, None))
         figure.legend(loc="outside lower center", ncols=2)

@@ -126,5 +126,7 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         over.annotate(across.text_of(one.value, 4), at, textcoords="offset points", **beside)
     plane.set(xlabel="real part", ylabel="imaginary part", xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), aspect="equal")
     over.set(xlabel=across.title, ylabel="spectral radius", xlim=(values[0], values[-1]))
-    over.set_ylim(min(0.95 * float(result.radius.min()), 0.9), min(max(1.1, 1.05 * float(result.radius.max())), SHOWN))
+    low, high = float(result.radius.min()), float(result.radius.max())
+    room = 0.05 * (max(high, 1.0) - min(low, 1.0))
+    over.set_ylim(min(low, 1.0) - room, max(high, 1.0) + room)
     return figure

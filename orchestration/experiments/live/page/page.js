@@ -311,7 +311,7 @@ function plan() {
   }
   const units = new Map();
   columns.forEach(([name, , , unit], i) => { if (!used.has(i)) { if (!units.has(unit)) units.set(unit, []); units.get(unit).push([name, i]); } });
-  const marks = ["━", "╍", "┅", "━"], name = some => some.slice(0, 4).map(([name], k) => some.length > 1 ? `${name} ${marks[k]}` : name).join(", ");
+  const marks = ["━", "╍", "┅", "━"], name = some => some.slice(0, 4).map(([name], k) => system.names[name] + (some.length > 1 ? ` ${marks[k]}` : "")).join(", ");
   for (const [unit, some] of [...units].slice(0, 6)) add(`${name(some)}${some.length > 4 ? " …" : ""}${unit ? ` [${unit.replace(/\./g, "·")}]` : ""}`, some.slice(0, 4).map(([, i]) => ({ column: i })));
   drawing.panels.forEach((panel, i) => {
     const section = document.createElement("section"), canvas = document.createElement("canvas");

@@ -274,6 +274,12 @@ def test_a_clipped_peak_is_noted_and_shown_in_an_inset(flight: Result) -> None:
             assert shown.get_title() == "clipped: peak −100 N·m at 0 s"
             assert shown.get_ylim()[0] < -100.0
             assert shown.get_xlim()[1] < 1.0
+    axes = Figure().add_subplot()
+    axes.plot(t, peaked)
+    axes.set_xlim(0.0, 10.0)
+    assert clip_peaks(axes, [(t, peaked)], "N.m", SCREEN, beside=(0.0, 1.0)), "the panel beside it shows the peak"
+    assert inset(axes) is None
+    assert [text.get_text() for text in axes.texts] == ["clipped: peak −100 N·m at 0 s"]
 
 
 def shaded(axes: Axes) -> Sequence[FillBetweenPolyCollection]:
