@@ -30,8 +30,8 @@ def test_flags_are_named_as_arguments(text: str) -> None:
 def test_the_api_names_the_argument_and_the_command_its_flag(main: Main) -> None:
     with pytest.raises(UsageError, match=r"^of = peroid: did you mean period\? expected one of"):
         quadcosim.limit(Scenario(), "peroid")
-    with pytest.raises(UsageError, match=r"^of = connections.command.delay: expected first and last, between which"):
-        quadcosim.limit(Scenario(), "connections.command.delay")
+    with pytest.raises(UsageError, match=r"^of = plant.mass: expected first and last, between which"):
+        quadcosim.limit(Scenario(), "plant.mass")
     assert "--of peroid: did you mean period? expected one of" in main("limit", "--of", "peroid", code=2).stderr
     with pytest.raises(UsageError, match=r"^of = peroid: "):  # and after it as before
         quadcosim.limit(Scenario(), "peroid")

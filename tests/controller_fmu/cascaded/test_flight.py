@@ -45,8 +45,7 @@ def test_about_hover_it_is_stable_to_89_ms_where_all_loops_run_at_one_period() -
     instances = Instances()
     growths = [growth_of_loop(hovering(period, ONE_RATE), instances) for period in (0.088, 0.09)]
     assert growths[0] < 0.0 < growths[1]
-    with pytest.raises(UsageError, match="responds to a pulse differently from sample to sample"):
-        growth_of_loop(hovering(0.001, {}), instances)
+    assert growth_of_loop(hovering(0.001, {}), instances) < 0.0  # at 1 kHz its outer loops run at 100 and 250 Hz
     instances.close()
 
 

@@ -140,7 +140,7 @@ def test_in_single_precision_a_clock_of_its_own_misses_samples(exported: dict[st
     names = to_note(sides[0], sides[1], tmp_path)
     flags = (f"-DSTEPS={STEPS}", "-DH=0.004", "-DSAMPLE_PERIOD=0.004")
     rows = rows_of(on_this_machine("embedded_flight.c", sides, tmp_path, *flags))
-    assert STEPS / 2 < rows[-1, names.index("c.sample_count")] < 0.8 * STEPS  # as the page says
+    assert STEPS / 2 < rows[-1, names.index("c.sample_count")] < 0.85 * STEPS  # as the page says
 
 
 def test_what_cannot_be_is_said_by_a_status_with_words_and_the_outputs_stay(

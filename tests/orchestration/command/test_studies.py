@@ -88,7 +88,8 @@ def test_status_tells_how_far_a_sweep_in_another_process_is(folder: Path, main: 
         told = main("status", "study.toml").stdout
         assert running.poll() is None
         kill(running.pid)
-    found = re.fullmatch(rf"\d+ bounded of {RUNS} runs\n{STORE}: (\d+) of {RUNS} runs, 0 failed, (\d+) missing\n", told)
+    state = rf"{STORE}: (\d+) of {RUNS} runs, 0 failed, (\d+) missing; quadcosim sweep study.toml runs them\n"
+    found = re.fullmatch(rf"\d+ bounded of {RUNS} runs\n{state}", told)
     assert found is not None, told
     done, missing = map(int, found.groups())
     assert 1 <= done < RUNS

@@ -75,7 +75,7 @@ def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() 
     half = SimpleNamespace(A=[0.0], dt=0.01)
 
     def sentence(radius: float) -> str:
-        loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius)
+        loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius, clock="sampled every 10 ms")
         return str(cast("Any", Linearised.verdict).fget(loop))
 
     assert sentence(0.9).startswith("stable: spectral radius 0.9, sampled every 10 ms: law with 1 state,")

@@ -249,12 +249,15 @@ def test_a_parameter_that_an_fmu_does_not_take_is_a_warning(tmp_path: Path) -> N
 
 
 def test_a_value_of_an_objective_that_is_not_finite_is_a_warning_that_names_it(tmp_path: Path) -> None:
-    path = small(tmp_path, "ENDS=m->s.x[0] = NAN")
-    result = ran(dataclasses.replace(alone(path), objectives={"peak": "max(it.y)"}))
-    judged = ran(dataclasses.replace(alone(path), criterion=Criterion(good="max(it.y) < 2")))
+    (tmp_path / "odd").mkdir()
+    system = twice(small(tmp_path))
+    second = Component(fmu=str(small(tmp_path / "odd", "ENDS=m->s.x[0] = NAN")), step=0.01)
+    system = dataclasses.replace(system, components={**system.components, "second": second})
+    result = ran(dataclasses.replace(system, objectives={"peak": "max(second.y)"}))
+    judged = ran(dataclasses.replace(system, criterion=Criterion(good="max(second.y) < 2")))
     assert (result.metrics["peak"], judged.metrics["good"]) == (None, False)
-    assert result.warnings == judged.warnings == ("it.y = nan at t = 0.06 s: what uses it may have no value",)
-    assert ran(alone(path)).warnings == ()
+    assert result.warnings == judged.warnings == ("second.y = nan at t = 0.06 s: what uses it may have no value",)
+    assert ran(system).warnings == ()
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

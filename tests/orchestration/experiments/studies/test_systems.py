@@ -275,7 +275,7 @@ def test_without_an_operating_point_there_is_no_local_limit_with_the_reason_note
         ({"of": "mass"}, "of = mass: expected a path, as connections.NAME.delay"),
         ({"of": "connections.command.order"}, "of = connections.command.order: expected the path of a number"),
         ({"of": "connections.9.delay"}, "connections.9.delay: expected connections.NAME.KEY"),
-        ({"of": DELAY}, f"of = {DELAY}: expected first and last"),
+        ({"of": "components.plant.parameters.initial.x"}, "expected first and last"),
         (
             {"of": DELAY, "first": 1.0, "last": 0.5},
             "first = 1, last = 0.5: expected finite numbers, the first one smaller",
