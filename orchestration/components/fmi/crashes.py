@@ -12,18 +12,18 @@ _SIGNALS = (signal.SIGSEGV, signal.SIGFPE, signal.SIGILL)
 _WITH_CONTEXT = 4
 """SA_SIGINFO of signal.h"""
 _COUNTER = {"x86_64": 168, "aarch64": 440}
-"""Where in a `ucontext_t` of glibc the address of the failing instruction is, by machine"""
+"""Offsets in a `ucontext_t` of glibc of the address of the failing instruction, by machine"""
 _BACK: dict[str, Callable[[int], int]] = {
     "x86_64": lambda context: _word(_word(context + 160)),
     "aarch64": lambda context: _word(context + 424),
 }
-"""Where a function returns to that has just been called: on top of the stack, or in the link register"""
+"""Addresses to which a function returns that has just been called: on top of the stack, or in the link register"""
 _DEPTH = 64
 """Most frames that are looked at"""
 _PATIENCE = 10
 """Time for the search [s]: it waits for ever if the crash is of `malloc`; then SIGALRM ends the process"""
 _KEPT: list[Any] = []
-"""What C calls, which must not be collected"""
+"""Functions that C calls, which must not be collected"""
 
 
 class _Action(ctypes.Structure):

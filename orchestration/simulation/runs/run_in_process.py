@@ -93,7 +93,7 @@ class _Receiver:
         self.components: Sequence[str] = ()
         """whose FMUs may be called meanwhile"""
         self.place = ""
-        """Where the C of an FMU has crashed, if that is known"""
+        """Line at which the C of an FMU has crashed, if that is known"""
         self.columns: tuple[str, ...] = ()
         self.recorded_until = -1.0
         """Time up to which rows are recorded [s]"""
