@@ -11,7 +11,7 @@ from orchestration.command.options import option
 from orchestration.command.registry import expect_positive
 from orchestration.components.fmi.access import INTERFACES, SCHEDULED, SOLVERS
 from orchestration.foundation.basics.errors import UsageError, expected_name
-from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.terminal import inform, warn
 
 if TYPE_CHECKING:
     from orchestration.simulation.runs.result import Result
@@ -60,7 +60,7 @@ class OneFmuFlags:
 
     def applied_to(self, path: Path, flags: FlightFlags) -> "System":
         """The FMU at `path` alone, with these flags and those of any system; `--set` has the names of the FMU."""
-        from orchestration.simulation.requests.one_fmu import alone, remarks
+        from orchestration.simulation.requests.one_fmu import alone, late_jump, remarks
 
         solver = _chosen("solver", self.solver, SOLVERS)
         interface = _chosen("interface", self.interface, _ALONE) or ("model-exchange" if solver else None)
@@ -71,6 +71,8 @@ class OneFmuFlags:
         )  # fmt: skip
         for remark in remarks(system, is_default_end=flags.stop_time is None):
             inform(remark)
+        if (late := late_jump(system)) is not None:
+            warn(f"{self.inputs}: {late}")
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
 
     def write(self, path: Path, result: "Result") -> None:

@@ -1,10 +1,13 @@
 """One FMU alone as a system, as `fmpy simulate` runs it: its default experiment, and inputs from a file."""
 
+import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 from fmpy.util import auto_interval
 
 from orchestration.components.fmi.access import Access, Interface, Solver
@@ -18,6 +21,8 @@ from orchestration.systems.system.source import Source
 
 LONG = 1e4
 """Default end [s] from which a run may take long"""
+SHORTEST = Fraction(1, 100_000)
+"""Shortest step [s] that a warning advises"""
 MOST_ROWS = 1000
 """Rows above which the interval of the FMU is doubled, as fmpy does"""
 
@@ -90,6 +95,39 @@ def remarks(system: System, *, is_default_end: bool) -> Iterator[str]:
         first, *_, last = read_rows(file, (TIME,)).columns[TIME].tolist()
         if first > begin or last < begin + system.stop_time:
             yield f"{file} covers {first:g} to {last:g} s: its first and last row hold before and after"
+
+
+def late_jump(system: System) -> str | None:
+    """The warning about inputs that jump between communication points: the first jump, and the step that has all."""
+    (component,) = system.components.values()
+    begin, step = Fraction(repr(component.start_time or 0.0)), Fraction(repr(component.step))
+    late: list[tuple[Fraction, str]] = []
+    for source in system.sources.values():
+        assert source.file is not None
+        assert source.columns is not None
+        rows = read_rows(source.file, (TIME, *source.columns))
+        may_jump = np.diff(rows.columns[TIME]) == 0.0 if source.interpolation == "linear" else True
+        for column, to in zip(source.columns, source.to):
+            jumps = np.flatnonzero((np.diff(rows.columns[column]) != 0.0) & may_jump) + 1
+            times = (Fraction(repr(time)) for time in rows.columns[TIME][jumps].tolist())
+            within = (time for time in times if begin < time < begin + Fraction(repr(system.stop_time)))
+            late += [(time, to.partition(".")[2]) for time in within if (time - begin) % step]
+    if not late:
+        return None
+    first, name = min(late)
+    seen = begin + math.ceil((first - begin) / step) * step
+    shorter = functools.reduce(_common, (time - begin for time, _ in late), step)
+    advice = f"; --output-interval {float(shorter):.10g} has every jump at its time" if shorter >= SHORTEST else ""
+    return (
+        f"input {name} jumps at {float(first)} s, between steps of {float(step):.10g} s: "
+        f"the FMU has it from {float(seen):.10g} s on{advice}"
+    )
+
+
+def _common(one: Fraction, other: Fraction) -> Fraction:
+    """The longest step of which both times are multiples."""
+    denominator = math.lcm(one.denominator, other.denominator)
+    return Fraction(math.gcd(int(one * denominator), int(other * denominator)), denominator)
 
 
 def _time(model: Model, key: str) -> float | None:

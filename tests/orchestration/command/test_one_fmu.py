@@ -82,6 +82,20 @@ def test_a_default_end_that_is_long_is_said_with_its_steps(here: Path) -> None:
 
 
 @needs_compiler
+def test_a_jump_between_two_steps_is_warned_of_with_the_step_that_has_it(main: Main, here: Path) -> None:
+    inputs, fmu = here / "off.csv", known(small(here))
+    flags = ("--in-process", "--inputs", inputs, "--stop-time", "1")
+    inputs.write_text("time,u,on\n0,1,0\n0.1,1,1\n0.2534,2,1\n0.2534,3,1\n0.3,4,1\n2,4,0\n")
+    warned = main("run", fmu, *flags, "--output-interval", "0.1").stderr
+    late = "off.csv: input u jumps at 0.2534 s, between steps of 0.1 s: the FMU has it from 0.3 s on; "
+    assert f"{late}--output-interval 0.0002 has every jump at its time" in warned
+    assert warned.count("jumps") == 1
+    assert "jumps" not in main("run", fmu, *flags, "--output-interval", "0.0002").stderr
+    inputs.write_text("time,on\n0,0\n0.25,1\n2,1\n")
+    assert "input on jumps at 0.25 s" in main("run", fmu, *flags, "--output-interval", "0.1").stderr
+
+
+@needs_compiler
 def test_flags_of_one_fmu_are_refused_for_a_system_and_those_of_a_loop_for_one(main: Main, here: Path) -> None:
     assert "--output-interval: for one FMU only" in main("run", "--output-interval", "0.1", code=2).stderr
     assert "--delay: for the quadrotor only" in main("run", small(here), "--delay", "0.1", code=2).stderr
