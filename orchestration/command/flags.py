@@ -1,6 +1,7 @@
 """The flags of every command that runs a scenario or a system."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
@@ -275,6 +276,10 @@ def _value(text: str) -> Any:
     if len(text) > 1 and text[0] == text[-1] == '"':
         return text[1:-1]
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
         return text
+    with suppress(ValueError):
+        if 2**53 <= abs(whole := int(text)) < 2**64:
+            return whole  # as in a file: whether a float holds it, where that counts, is for the variable to say
+    return number

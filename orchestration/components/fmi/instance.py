@@ -117,7 +117,7 @@ def _chosen(choices: Mapping[str, int], value: object, place: str) -> int:
 
 
 def _is_float(value: float) -> bool:
-    return isinstance(value, float) or abs(value) < 2**63
+    return isinstance(value, float) or abs(value) < 2**64
 
 
 def _of_kind(value: object, kind: type, place: str, expected: str) -> Value:

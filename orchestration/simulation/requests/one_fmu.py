@@ -167,6 +167,7 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
         elif column != TIME:
             hint = did_you_mean(column, known)
             raise UsageError(f"{inputs}: {model.name} has no input {column}; its inputs are {listed(known)}{hint}")
+    _expect_whole_numbers_held(model, inputs, columns)
     sources = {}
     for interpolation, continuous in (("linear", True), ("previous", False)):
         fed = [each for each in columns if (model.variables[each].variability == "continuous") is continuous]
@@ -177,3 +178,14 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
                 columns=tuple(columns[each] for each in fed), start_time=begin or None, outside="held",
             )  # fmt: skip
     return sources
+
+
+def _expect_whole_numbers_held(model: Model, inputs: Path, columns: Mapping[str, str]) -> None:
+    """Raise `UsageError` for a number of an integer input that may not be the one in the file: rows are floats."""
+    of_64_bits = [columns[name] for name in columns if model.variables[name].type in ("Int64", "UInt64")]
+    if of_64_bits:
+        rows = read_rows(inputs, of_64_bits)
+        for column in of_64_bits:
+            beyond = np.abs(rows.columns[column]) >= 2.0**53
+            if beyond.any():
+                raise rows.error(int(beyond.argmax()), column, "a whole number that a float holds: below 2**53")

@@ -96,6 +96,21 @@ def test_a_jump_between_two_steps_is_warned_of_with_the_step_that_has_it(main: M
 
 
 @needs_compiler
+def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_from_a_file(
+    main: Main, here: Path
+) -> None:
+    inputs, big = here / "big.csv", '<Int64 name="big" valueReference="9" causality="input" start="0"/>'
+    fmu = known(small(here, fmi=3, more=big))
+    for number in (2**53 + 1, 2**63 - 1):
+        refused = main("run", fmu, "--in-process", "--set", f"big={number}", code=2).stderr
+        assert f"big = {number}: expected a whole number that a float holds" in refused
+    inputs.write_text(f"time,big\n0,1\n1,{2**53 + 1}\n")
+    refused = main("run", fmu, "--in-process", "--inputs", inputs, code=2).stderr
+    assert "line 3: big = " in refused
+    assert "expected a whole number that a float holds" in refused
+
+
+@needs_compiler
 def test_flags_of_one_fmu_are_refused_for_a_system_and_those_of_a_loop_for_one(main: Main, here: Path) -> None:
     assert "--output-interval: for one FMU only" in main("run", "--output-interval", "0.1", code=2).stderr
     assert "--delay: for the quadrotor only" in main("run", small(here), "--delay", "0.1", code=2).stderr
