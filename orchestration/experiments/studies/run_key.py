@@ -223,10 +223,17 @@ def design_parts(study: Study) -> dict[str, str]:
     return {name: json.dumps(value, sort_keys=True) for name, value in parts.items()}
 
 
+CONTENT = "content of "
+"""How the place of a file begins that only an axis names: with another design there may be others"""
+
+
 def place_parts(study: Study, files: Files) -> dict[str, str]:
-    """The origin of a store's rows besides the study file."""
+    """The origin of a store's rows besides the study file, the content of files that an axis names among it."""
+    of_components = {f"FMU of the {name}": one.fmu for name, one in study.origin.components.items()}
+    others = files.hashes.keys() - {*of_components.values(), *files_read_by(study.origin)}
     return {
-        **{f"FMU of the {name}": files.hashes[one.fmu] for name, one in study.origin.components.items()},
+        **{of: files.hashes[fmu] for of, fmu in of_components.items()},
+        **{f"{CONTENT}{name}": files.hashes[name] for name in sorted(others)},
         **{f"version of {name}": version for name, version in versions().items()},
         "machine": machine(),
     }

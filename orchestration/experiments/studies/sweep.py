@@ -16,7 +16,7 @@ from orchestration.experiments.studies import store
 from orchestration.experiments.studies.checks import Checked, check_design, describe_run
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
-from orchestration.experiments.studies.run_key import design_parts, difference, place_parts, study_parts
+from orchestration.experiments.studies.run_key import CONTENT, design_parts, difference, place_parts, study_parts
 from orchestration.experiments.studies.store_columns import UNITS
 from orchestration.experiments.studies.study import StartValues, Study
 from orchestration.experiments.studies.study_file import FileLike, load_study
@@ -283,8 +283,10 @@ def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
     about, study = opened.about(), columns.study
     if STUDY_PARTS not in about:
         return
-    before = {**json.loads(about[STUDY_PARTS]), **json.loads(about[PLACE_PARTS])}
-    if changes := difference(before, {**study_parts(study), **place_parts(study, columns.files)}):
+    before, place = json.loads(about[PLACE_PARTS]), place_parts(study, columns.files)
+    of_design = {key for key in before.keys() ^ place.keys() if key.startswith(CONTENT)}
+    before, place = ({key: part[key] for key in part.keys() - of_design} for part in (before, place))
+    if changes := difference({**json.loads(about[STUDY_PARTS]), **before}, {**study_parts(study), **place}):
         raise UsageError(
             f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
             "or remove the store"
@@ -294,14 +296,15 @@ def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
 def _describe(opened: store.Store, columns: RunColumns) -> None:
     """Describe the study and its design in its store."""
     study, files = columns.study, columns.files
-    design = json.dumps(design_parts(study))
-    if opened.about().get(DESIGN_PARTS) == design:
+    design, place = json.dumps(design_parts(study)), json.dumps(place_parts(study, files))
+    about = opened.about()
+    if (about.get(DESIGN_PARTS), about.get(PLACE_PARTS)) == (design, place):
         return
     grid: dict[str, Any] | None = {axis.name: axis.values for axis in study.axes}
     opened.describe(
         {
             STUDY_PARTS: json.dumps(study_parts(study)),
-            PLACE_PARTS: json.dumps(place_parts(study, files)),
+            PLACE_PARTS: place,
             DESIGN_PARTS: design,
             TOTAL: str(len(study.points)),
             AXES: json.dumps([axis.name for axis in study.axes]),

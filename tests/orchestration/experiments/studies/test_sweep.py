@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from orchestration.components.building.fmus import locate
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.store import open_for_reading, store_path
 from orchestration.experiments.studies.study import Study
@@ -144,6 +145,18 @@ def test_other_fmus_machines_and_sources_are_a_changed_study(
         monkeypatch.setattr("orchestration.experiments.studies.run_key.versions", lambda: edited)
     with pytest.raises(UsageError, match=said):
         sweep(study(PERIODS), folder=finished)
+
+
+def test_another_fmu_at_the_path_of_an_axis_is_a_changed_study_and_a_further_path_is_none(tmp_path: Path) -> None:
+    paths = [str(tmp_path / f"{name}.fmu") for name in "ab"]
+    for path in paths:
+        shutil.copy(locate(NATIVE.controller.fmu), path)
+    sweep(study(axis("controller.fmu", paths[0])), folder=tmp_path)
+    chosen = study(axis("controller.fmu", *paths))
+    assert sweep(chosen, folder=tmp_path).flown == 0  # by content the same run
+    shutil.copy(locate("native/GeometricController"), paths[1])
+    with pytest.raises(UsageError, match=r"holds another study \(content of .*b.fmu was "):
+        sweep(chosen, folder=tmp_path)
 
 
 def all_rows(path: Path) -> list[dict[str, Any]]:
