@@ -59,22 +59,34 @@ class Compared:
 
     @property
     def verdict(self) -> str:
-        """Up to which value of the axis half of the runs survive, by controller, where first it was measured."""
+        """Up to which value of the axis half of the starts survive and settle, where first it was measured."""
         outcome = self.outcome
-        half = [one for one in outcome.limits if (one.fate, one.share) == ("survive", "half")]
-        unit = "s" if self.comparison.is_in_seconds else None
+        half = [one for one in outcome.limits if one.share == "half"]
         if not half:
             counts = [f"{cell.controller} {cell.survives.count} of {cell.count}" for cell in outcome.cells]
             return f"no limits, as cells are missing; survive: {some(counts)}" if counts else "no cell has runs"
         places = dict.fromkeys((one.vehicle, one.condition) for one in half)
         first = next(iter(places))
-        reached = [
-            f"{one.controller} to {quantity(one.value, unit)}" for one in half if (one.vehicle, one.condition) == first
+        reached: dict[str, dict[str, list[str]]] = {}
+        for one in half:
+            if (one.vehicle, one.condition) == first:
+                fates = reached.setdefault(one.controller, {})
+                fates.setdefault(self._up_to(one.value), []).append(f"{one.fate}s")
+        found = [
+            f"{controller} " + " and ".join(f"{' and '.join(those)} {up_to}" for up_to, those in fates.items())
+            for controller, fates in reached.items()
         ]
         others = f" ({len(places) - 1} more below)" if len(places) > 1 else ""
         where = f"{first[0]}, {first[1]}"
-        axis = self.comparison.axis.name
-        return f"half of the runs survive over {axis}: {some(reached)}; {where}{others}"
+        return f"from half of the starts, over {self.comparison.axis.name}: {some(found)}; {where}{others}"
+
+    def _up_to(self, value: float) -> str:
+        """The words for a limit; its grid may end before it, or begin after it."""
+        values = self.comparison.values
+        if value not in values:
+            return "at no value"
+        unit = "s" if self.comparison.is_in_seconds else None
+        return f"to {'at least ' if value == values[-1] else ''}{quantity(value, unit)}"
 
     def __repr__(self) -> str:
         return (

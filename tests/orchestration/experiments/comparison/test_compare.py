@@ -109,7 +109,7 @@ def test_nothing_is_run_twice_and_the_result_stays(table: str, folder: Path, mai
     assert "48 runs, 0 of them new" in done.stderr
     document = json.loads(done.stdout)
     assert len(document["cells"]) == CELLS
-    assert document["verdict"].startswith("half of the runs survive over period: coupled to ")
+    assert document["verdict"].startswith("from half of the starts, over period: coupled survives ")
     assert document["verdict"].endswith("; base, nominal (1 more below)")
     assert (folder / "out" / "cells.csv").read_bytes() == before
 
@@ -118,7 +118,7 @@ def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
     native = replace(quadcosim.load_comparison(folder / "small.toml"), native=True)
     found = quadcosim.compare(native, folder=folder / "out", figures=False, progress=None, announce=None)
     assert found.summary.flown == 0
-    assert found.verdict.startswith("half of the runs survive over period: coupled to ")
+    assert found.verdict.startswith("from half of the starts, over period: coupled survives ")
     assert {*found.plot(style="paper")} == {path.stem for path in (folder / "out").glob("*.png")}
 
 
