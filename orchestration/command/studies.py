@@ -85,7 +85,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
     agreement = LaneAgreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
-    then = f"; quadcosim sweep {study} runs them" if missing else ""
+    then = f"; {_sweep_command(study, out)} runs them" if missing else ""
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing{then}"]
     if agreement is not None:
         lines.append(f"engine {about[ENGINE]}: {agreement}")
@@ -164,6 +164,11 @@ def draw(
         return result_of_files(draw_study(loaded, store, metric, look.figure_style, progress, out=out))
 
 
+def _sweep_command(study: Path, out: Path | None) -> str:
+    """The command that runs what a store in that folder misses."""
+    return f"quadcosim sweep {study}" + ("" if out is None else f" --out {out}")
+
+
 def _current_store(study: Path, out: Path | None) -> Path:
     """The store of a study file that has not changed since its runs; warns if some are missing."""
     from orchestration.experiments.studies.store import open_for_reading, store_path
@@ -176,5 +181,5 @@ def _current_store(study: Path, out: Path | None) -> Path:
         expect_current(opened, loaded)
         there, total = sum(opened.counts().values()), len(loaded.points)
     if there < total:
-        warn(f"{path}: {there} of {total} runs; the others are missing, quadcosim sweep {study} runs them")
+        warn(f"{path}: {there} of {total} runs; the others are missing, {_sweep_command(study, out)} runs them")
     return path
