@@ -12,6 +12,7 @@ from orchestration.foundation.basics.number_text import some
 
 if TYPE_CHECKING:
     from orchestration.components.checks.doctor.report import DoctorReport
+    from orchestration.components.checks.doctor.verdict import UnexaminedFmu, Verdict
     from orchestration.experiments.comparison.cells import CellSummary
 
 
@@ -35,9 +36,21 @@ def of_problems(count: int, fmus: int) -> str:
 
 
 def of_doctor(report: DoctorReport) -> str:
-    """How many FMUs load on this machine with all that they require."""
-    count = len(report.verdicts)
-    good = sum(each.good for each in report.verdicts)
-    return (
-        f"{good} of {count} FMU{'' if count == 1 else 's'} load{'s' if count == 1 else ''} here, with nothing missing"
-    )
+    """How many FMUs load on this machine with all that they require, and what hinders the others."""
+    count, bad = len(report.verdicts), [each for each in report.verdicts if not each.good]
+    parts = [some(map(_hindrance, bad), "; ")] if bad else []
+    if len(bad) < count or not bad:
+        many = " loads" if count == 1 else "s load"
+        parts.insert(0, f"{count - len(bad)} of {count} FMU{many} here, with nothing missing")
+    return "; ".join(parts)
+
+
+def _hindrance(bad: Verdict | UnexaminedFmu) -> str:
+    """Why an FMU does not load here, or what is missing although it does."""
+    from orchestration.components.checks.doctor.verdict import UnexaminedFmu
+
+    path = bad.path if isinstance(bad, UnexaminedFmu) else bad.fmu.path
+    if isinstance(bad, UnexaminedFmu) or bad.failure is not None:
+        return f"{path.name} does not load: {bad.failure}"
+    missing = dict.fromkeys((*bad.problems, *bad.python_host.needs, *bad.other_host.needs))
+    return f"{path.name} loads, but something is missing: {some(missing)}"

@@ -188,4 +188,5 @@ def _expect_whole_numbers_held(model: Model, inputs: Path, columns: Mapping[str,
         for column in of_64_bits:
             beyond = np.abs(rows.columns[column]) >= 2.0**53
             if beyond.any():
-                raise rows.error(int(beyond.argmax()), column, "a whole number that a float holds: below 2**53")
+                place = f"{inputs}: line {rows.lines[int(beyond.argmax())]}: {column}"
+                raise UsageError(f"{place}: expected a whole number that a float holds: below 2**53")

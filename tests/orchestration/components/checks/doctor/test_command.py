@@ -224,7 +224,8 @@ def test_an_fmu_of_another_version_of_fmi_is_said_and_the_others_are_looked_at(t
     both = one, lag(tmp_path / "two.fmu")
     done = main("doctor", *both, code=1)
     answer, _, rest = done.stdout.partition("\n")
-    assert answer == "1 of 2 FMUs load here, with nothing missing"
+    assert answer == f"1 of 2 FMUs load here, with nothing missing; one.fmu does not load: {why}"
+    assert main("doctor", one, code=1).stdout.partition("\n")[0] == f"one.fmu does not load: {why}"
     blocks = rest.rstrip("\n").split("\n\n")
     assert [block.splitlines()[0] for block in blocks] == ["this machine", *map(str, both)]
     assert blocks[1].splitlines()[1:] == [f"! file         {why}"]
