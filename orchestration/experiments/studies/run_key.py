@@ -224,7 +224,7 @@ def design_parts(study: Study) -> dict[str, str]:
 
 
 CONTENT = "content of "
-"""How the place of a file begins that only an axis names: with another design there may be others"""
+"""The beginning of the place of a file that only an axis names: with another design there may be others"""
 
 
 def place_parts(study: Study, files: Files) -> dict[str, str]:
