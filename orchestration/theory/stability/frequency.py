@@ -53,6 +53,8 @@ SLOWER = 0.03
 FREQUENCIES = 1500
 BESIDE_A_POLE = np.linspace(-4.0, 4.0, 17)
 """Further frequencies about that of a pole, in units of its damping"""
+BESIDE_A_TURN = 1e-4
+"""Least distance of a frequency from whole turns in a period of several samples"""
 HALVINGS = 60
 PROVED = 1e-3
 """Relative distance from a gain margin at which the loop is stable on one side and unstable on the other"""
@@ -384,7 +386,10 @@ def _is_finite_at(loop: Linearised, frequency: float) -> bool:
 
 
 def _frequencies(loop: Linearised) -> Floats:
-    """Frequencies at which loops are evaluated [rad/s]: even in the logarithm, and closer about those of poles."""
+    """Frequencies at which loops are evaluated [rad/s]: even in the logarithm, and closer about those of poles.
+
+    Of several samples a period none is a whole number of turns in it: there poles of 1, as of a position, are infinite.
+    """
     dt = loop.rest.dt
     top = math.pi / loop.dt
     of_closed = _rates(closed(loop).A, dt)
@@ -392,7 +397,9 @@ def _frequencies(loop: Linearised) -> Floats:
     low = max(SLOWER * float(np.abs(of_closed).min(initial=top)), LOWEST * top)
     about = [abs(rate.imag) + BESIDE_A_POLE * max(abs(rate.real), 1e-3 * abs(rate.imag)) for rate in rates]
     found = np.concatenate([np.geomspace(low, top, FREQUENCIES), *about])
-    return np.unique(found[(found >= low) & (found <= top)])
+    turns = found * dt / (2.0 * math.pi)
+    infinite = (turns > 0.5) & (np.abs(turns - np.round(turns)) < BESIDE_A_TURN)
+    return np.unique(found[(found >= low) & (found <= top) & ~infinite])
 
 
 def _rates(A: Floats, dt: float) -> Complexes:
