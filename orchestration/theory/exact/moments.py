@@ -23,8 +23,10 @@ MAX_FOURTH_PRODUCTS = 1e8
 """products to propagate fourth moments over a period"""
 MOST_DOUBLINGS = 60
 """Most doublings of the number of periods in a sum"""
-DENSE = 400
+DENSE = 1200
 """numbers up to which an operator is made a matrix"""
+GROWN = 30
+"""periods after which moments are near those that grow longest, by which states are scaled"""
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,7 @@ class JumpLinear:
 
     @functools.cached_property
     def fourth_moment_radius(self) -> float | None:
-        """The growth factor of fourth moments over a period; None where they are too many to compute."""
+        """The growth factor of fourth moments over a period; None where they are more than `DENSE`."""
         if self._deterministic_map is not None:
             return _spectral_radius(self._deterministic_map) ** 4
         halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
@@ -163,6 +165,8 @@ class JumpLinear:
             for i, stage in enumerate(self._stages)
         ]
         basis = _SymmetricBasis(halves[0])
+        if basis.count > DENSE:  # by Krylov's method their rounding may grow faster than they do
+            return None
 
         def propagate(numbers: Floats) -> Floats:
             now = basis.matrices(numbers)
@@ -170,7 +174,7 @@ class JumpLinear:
                 now = batches.of(now)
             return basis.numbers(now)
 
-        return _radius(propagate, basis)
+        return _dense_radius(propagate, basis)
 
 
 def _spectral_radius(matrix: Floats) -> float:
@@ -191,13 +195,38 @@ def _geometric_sum(turn: Floats, added: Floats) -> Floats:
 def _radius(propagate: Map, basis: "_SymmetricBasis") -> float:
     if basis.count > SIZE:
         try:
-            return spectral_radius_of(propagate, basis.numbers([np.eye(n) for n in basis.sizes]))
+            return spectral_radius_of(_scaled(propagate, basis), basis.numbers([np.eye(n) for n in basis.sizes]))
         except UsageError:
             if basis.count > DENSE:
                 raise
+    return _dense_radius(propagate, basis)
+
+
+def _dense_radius(propagate: Map, basis: "_SymmetricBasis") -> float:
     return _spectral_radius(
         np.array([propagate(unit) for unit in np.eye(basis.count)]).reshape(basis.count, basis.count)
     )
+
+
+def _scaled(propagate: Map, basis: "_SymmetricBasis") -> Map:
+    """The map in coordinates in which the moments that grow longest are near those of independent states of size 1.
+
+    In others, as those of a fast plant beside a slow one, eigenvalues of the map in a Krylov basis may be far off.
+    """
+    grown = basis.numbers([np.eye(n) for n in basis.sizes])
+    for _ in range(GROWN):
+        grown = propagate(grown)
+        grown /= max(float(np.linalg.norm(grown)), 1e-300)
+    roots = []
+    for moments in basis.matrices(grown):
+        sizes = np.sqrt(np.maximum(np.diag(moments), max(1e-20 * np.diag(moments).max(initial=0.0), 1e-300)))
+        roots.append(sizes[:, None] * np.linalg.cholesky(moments / np.outer(sizes, sizes) + 1e-12 * np.eye(len(sizes))))
+    inverses = [np.linalg.inv(root) for root in roots]
+
+    def turned(numbers: Floats, by: Sequence[Floats]) -> Floats:
+        return basis.numbers([root @ each @ root.T for root, each in zip(by, basis.matrices(numbers))])
+
+    return lambda numbers: turned(propagate(turned(numbers, roots)), inverses)
 
 
 class _BatchedStage:

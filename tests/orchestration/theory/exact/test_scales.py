@@ -1,0 +1,25 @@
+"""Radii of moments of a loop whose states differ in size: those of the same loop in other units."""
+
+import numpy as np
+import pytest
+
+from orchestration.theory.exact.moments import JumpLinear, Passage
+from orchestration.theory.exact.pieces import Piece
+
+
+def loop_of(size: int, units: float) -> JumpLinear:
+    """A loop of two equally probable maps, of which each state is that of a chain in a unit of its own."""
+    random, scales = np.random.default_rng(4), np.geomspace(1.0, units, size)
+    stage = []
+    for _ in range(2):
+        Z = np.triu(random.normal(size=(size, size)), 1) + np.diag(np.linspace(0.5, 0.9, size))
+        Z = Z * (scales[:, None] / scales)
+        stage.append(Passage(0, 0, 0.5, Piece(Z, np.eye(size), np.eye(size)[None], np.zeros(1))))
+    return JumpLinear([stage], [[size]])
+
+
+def test_the_growth_of_moments_does_not_depend_on_units() -> None:
+    """Maps of upper triangles: their moments grow as those of their diagonals, however large the rest."""
+    for units in (1.0, 1e6):
+        assert loop_of(15, units).radius == pytest.approx(0.81, rel=1e-4)
+        assert loop_of(8, units).fourth_moment_radius == pytest.approx(0.9**4, rel=1e-3)
