@@ -16,6 +16,10 @@ LEVELS = 4
 """Levels of the Morris design"""
 RESAMPLING_SEED = 1
 """Seed of the confidence intervals; SALib treats 0 as no seed"""
+RESAMPLES = 1000
+"""Samples of a confidence interval"""
+TWO_SIDED = 1.96
+"""Standard deviations in half a 95 % interval"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +42,8 @@ def shares(method: SensitivityMethod, dimension: int, samples: int, seed: int) -
     """The design in the unit cube: Morris trajectories, n (d + 1) rows, or Saltelli's, n (d + 2) rows."""
     problem = _problem([f"axis {i}" for i in range(dimension)])
     if method == "morris":
+        if samples < 2:
+            raise UsageError(f"design.samples = {samples}: expected at least 2 for morris, whose effects have a spread")
         from SALib.sample.morris import sample as morris
 
         return np.asarray(morris(problem, samples, num_levels=LEVELS, seed=seed))
@@ -64,8 +70,11 @@ def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: 
         from SALib.analyze.morris import analyze as morris
 
         result = morris(problem, design, values, num_levels=LEVELS, seed=RESAMPLING_SEED)
-        sigma = [Index(axis=a, kind="sigma", value=float(v), confidence=0.0) for a, v in zip(axes, result["sigma"])]
-        return [*_indices(axes, "mu_star", result["mu_star"], result["mu_star_conf"]), *sigma]
+        widths = _confidence_of_spread(_effects(design, values))
+        return [
+            *_indices(axes, "mu_star", result["mu_star"], result["mu_star_conf"]),
+            *_indices(axes, "sigma", result["sigma"], widths),
+        ]
     from SALib.analyze.sobol import analyze as sobol
 
     result = sobol(problem, values, calc_second_order=False, seed=RESAMPLING_SEED)
@@ -73,6 +82,20 @@ def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: 
         *_indices(axes, "first", result["S1"], result["S1_conf"]),
         *_indices(axes, "total", result["ST"], result["ST_conf"]),
     ]
+
+
+def _effects(design: Floats, values: Floats) -> Floats:
+    """The elementary effects of Morris trajectories, shape (n, d): each step of one changes one axis."""
+    d = design.shape[1]
+    steps, changes = np.diff(design.reshape(-1, d + 1, d), axis=1), np.diff(values.reshape(-1, d + 1), axis=1)
+    return np.asarray(((steps != 0.0) * (changes / steps.sum(axis=2))[:, :, None]).sum(axis=1))
+
+
+def _confidence_of_spread(effects: Floats) -> Floats:
+    """Half the width of the 95 % interval of sigma by axis, by bootstrap over the trajectories, as SALib's of mu*."""
+    generator, n = np.random.default_rng(RESAMPLING_SEED), len(effects)
+    sigmas = [effects[generator.integers(n, size=n)].std(axis=0, ddof=1) for _ in range(RESAMPLES)]
+    return np.asarray(TWO_SIDED * np.std(sigmas, axis=0, ddof=1))
 
 
 def write(indices: list[Index], path: Path) -> Path:

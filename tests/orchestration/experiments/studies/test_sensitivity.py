@@ -62,6 +62,17 @@ def test_morris_spread_shows_an_interaction() -> None:
     assert found["sigma", "c"].value == pytest.approx(0.0, abs=1e-12)
 
 
+def test_the_interval_of_a_morris_spread_is_as_wide_as_it_varies_from_design_to_design() -> None:
+    found = []
+    for seed in range(40):
+        design = shares("morris", 3, 20, seed=seed)
+        found.append(indices("morris", design[:, 0] * design[:, 1] + design[:, 2], design)["sigma", "a"])
+    sigmas = [each.value for each in found]
+    assert np.mean([each.confidence for each in found]) == pytest.approx(1.96 * np.std(sigmas, ddof=1), rel=0.3)
+    with pytest.raises(UsageError, match="design.samples = 1: expected at least 2 for morris"):
+        shares("morris", 3, 1, seed=0)
+
+
 @pytest.mark.parametrize("method", sensitivity.METHODS)
 def test_the_same_values_give_the_same_indices(method: SensitivityMethod) -> None:
     design = shares(method, 3, 8, seed=4)
