@@ -28,7 +28,7 @@ Where to begin:
 - `Simulation` stops a run at each sample, where your code takes the place of a controller or any other component;
 - `live` makes one HTML file in which a system runs while its numbers are changed;
 - `report` writes one HTML file of runs, with a replay;
-- `read_model` reads the variables and properties of an FMU.
+- `read_model` reads the variables and properties of an FMU, which is built first if need be.
 
 All times are in seconds, all values in the units that the FMUs declare. All errors are `QuadcosimError`s; a
 `UsageError` is an invalid request. Studies and tables need `pip install 'quadcosim[studies]'`.
@@ -46,7 +46,8 @@ from orchestration.foundation.basics.errors import in_python, set_wording
 set_wording(in_python)
 
 if TYPE_CHECKING:  # also what `__getattr__` finds public names by
-    from orchestration.components.fmi.read_description import Model, read_model
+    from orchestration.components.building.fmus import model_of as read_model
+    from orchestration.components.fmi.read_description import Model
     from orchestration.experiments.comparison.design import Comparison
     from orchestration.experiments.comparison.file import load_comparison
     from orchestration.experiments.comparison.run import Compared, compare

@@ -10,7 +10,6 @@ import pytest
 from scipy.io import loadmat
 
 import quadcosim
-from orchestration.components.building import fmus
 from quadcosim import QuadcosimError, Result, Scenario, System, UsageError
 from tests.commands import Main
 
@@ -32,7 +31,7 @@ def test_a_system_names_its_parts(result: Result) -> None:
 
 
 def test_an_fmu_tells_what_it_has_in_a_line() -> None:
-    model = quadcosim.read_model(str(fmus.locate("native/QuadrotorPlant")))
+    model = quadcosim.read_model("native/QuadrotorPlant")
     assert repr(model).startswith("<Model QuadrotorPlant, FMI 2: ")
     assert len(repr(model)) < 120
     assert model.variables["torque.x"].unit == "N.m"

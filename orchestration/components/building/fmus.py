@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from fmu_kit.archive import read_variant
 from fmu_kit.bundle import Target
@@ -26,6 +26,9 @@ from orchestration.components.building.builder import (
 from orchestration.components.building.models import MODELS, PATHS, WRAPPED
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.processes.subprocesses import checkout
+
+if TYPE_CHECKING:
+    from orchestration.components.fmi.read_description import Model
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -89,6 +92,13 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
         f"fmu = {fmu}: expected {' or '.join(MODELS)}, or the path of an .fmu file, or of the {WRAPPED} file of a "
         "controller in C"
     )
+
+
+def model_of(fmu: str | Path) -> "Model":
+    """The variables and properties that an FMU declares, of its name or path; raises `UsageError` as `locate` does."""
+    from orchestration.components.fmi.read_description import read_model  # not before: FMUs are built without it
+
+    return read_model(locate(str(fmu)))
 
 
 def look_up(fmu: str, announce: Callable[[str], None] | None = None) -> Path | None:

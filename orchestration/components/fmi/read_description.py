@@ -207,6 +207,9 @@ class Model:
         """A variable by name; raises `UsageError` naming the place and similar variables."""
         if name in self.variables:
             return self.variables[name]
+        own = name.removeprefix("parameters.")
+        if own in self.variables:
+            raise UsageError(f"{place}: expected {place.removesuffix(name)}{own}, without a table of parameters")
         hint = did_you_mean(name, self.variables, most=3) or ";"
         settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
         raise UsageError(

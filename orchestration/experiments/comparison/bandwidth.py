@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.foreign_calls import isolated_call
-from orchestration.components.fmi.read_description import read_model
 from orchestration.experiments.comparison.crossovers import CROSSOVERS
 from orchestration.experiments.comparison.design import FMU, Comparison, Controller, VehicleEntry
 from orchestration.experiments.studies.axes import Value
@@ -41,7 +40,7 @@ def _loop(
 ) -> ControlLoop:
     fmu = comparison.fmu_of(controller)
     sets = {**comparison.parameters_for(vehicle, controller), **controller.sets, **dict(tuned)}
-    known = read_model(fmus.locate(fmu)).variables
+    known = fmus.model_of(fmu).variables
     sets |= {f"controller.{name}": 0.0 for name in _OF_THE_PERIOD if name in known}
     plant = comparison.base.as_system().fmus["plant"]
     return comparison.base.with_values(

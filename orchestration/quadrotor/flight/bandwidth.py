@@ -6,7 +6,6 @@ from typing import cast
 import numpy as np
 
 from orchestration.components.building import fmus
-from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.scenarios import wiring
@@ -80,4 +79,4 @@ def _inertia(scenario: Scenario) -> float:
     name = "inertia.xx"
     if name in scenario.plant.parameters:
         return float(scenario.plant.parameters[name])
-    return float(read_model(fmus.locate(scenario.plant.fmu)).variables[name].start or 1.0)
+    return float(fmus.model_of(scenario.plant.fmu).variables[name].start or 1.0)

@@ -92,7 +92,8 @@ class Scenario:
         """This scenario with other timing keys, parameters (`controller.NAME`, `plant.NAME` and so on) or fields.
 
         A random value may be given as the table that a file has, or its text. A dictionary for `plant`, `controller`,
-        `reference` or `disturbance` has parameters: `plant={"mass": 1.2}`.
+        `reference` or `disturbance` has the keys of its table in a file: `controller={"fmu": "GeometricController"}`,
+        `plant={"mass": 1.2}`.
 
         Raises `UsageError` for a key that does not exist.
         """
@@ -255,6 +256,8 @@ class Scenario:
 SIDES = ("controller", "plant", "reference", "disturbance")
 """Tables of a scenario that have parameters"""
 OWN_KEYS = {
+    "controller": ("fmu",),
+    "plant": ("fmu",),
     "reference": ("name",),
     "disturbance": ("name", "interpolation", "drag"),
 }

@@ -320,6 +320,11 @@ def test_changes_leave_the_scenario_they_start_from() -> None:
     assert changed.controller.parameters == {"gain.eta": 1.0}
 
 
+def test_a_change_may_choose_the_fmu_of_a_side_with_its_parameters() -> None:
+    changed = Scenario().with_changes(controller={"fmu": "CascadedController", "velocity_ratio": 1})
+    assert changed.controller == FmuChoice(fmu="CascadedController", parameters={"velocity_ratio": 1})
+
+
 def test_a_changed_parameter_replaces_the_one_before() -> None:
     changed = Scenario().with_changes(parameters={"plant.mass": 1.0}).with_changes(parameters={"plant.mass": 2.0})
     assert changed.plant.parameters == {"mass": 2.0}

@@ -83,6 +83,7 @@ def test_the_installed_command_writes_it(tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (("--set", "plant.mas=1"), "plant.mas: QuadrotorPlant has no such variable; did you mean mass?"),
+        (("--set", "plant.parameters.mass=1"), "plant.parameters.mass: expected plant.mass, without a table"),
         (("--set", "plant.mass=true"), "plant.mass = True: expected a number"),
         (("--set", "controller.sample_period=0.1"), "controller.sample_period: expected --period and --clock instead"),
         (("nowhere.toml",), "nowhere.toml: expected a readable system or scenario file"),
