@@ -69,7 +69,7 @@ def test_the_interval_of_a_morris_spread_is_as_wide_as_it_varies_from_design_to_
         found.append(indices("morris", design[:, 0] * design[:, 1] + design[:, 2], design)["sigma", "a"])
     sigmas = [each.value for each in found]
     assert np.mean([each.confidence for each in found]) == pytest.approx(1.96 * np.std(sigmas, ddof=1), rel=0.3)
-    with pytest.raises(UsageError, match="design.samples = 1: expected at least 2 for morris"):
+    with pytest.raises(UsageError, match=r"design\.samples = 1: expected at least 2 for morris"):
         shares("morris", 3, 1, seed=0)
 
 
