@@ -77,7 +77,9 @@ def limit(
 
         for written in draw_limit(request, found, where):
             inform(str(written))
-    lines = [f"{name:<19}  {value}" for name, value in limits.as_text(found).items()]
+    texts = limits.as_text(found)
+    width = max(map(len, texts))
+    lines = [f"{name:<{width}}  {value}" for name, value in texts.items()]
     if shares := limits.shares_as_text(found):
         lines += ["", *in_columns(shares)]
     return CommandResult(document=found, verdict=found.verdict, lines=lines)

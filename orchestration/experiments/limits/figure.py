@@ -103,7 +103,9 @@ def _draw_marks(
 def _draw_limits(axes: Axes, result: Limit, across: Quantity) -> None:
     """The limits as lines, with the region beyond the measured one shaded."""
     named = (
+        (result.large_signal_lower_limit, RED, "-", "measured lower limit"),
         (result.large_signal_limit, RED, "-", "measured limit"),
+        (result.local_lower_limit, ORANGE, "--", "local lower limit, by theory"),
         (result.local_limit, ORANGE, "--", "local limit, by theory"),
         (result.refuted_limit, GREY, "-.", f"{RELIABILITY:.0%} refuted"),
     )
@@ -114,14 +116,23 @@ def _draw_limits(axes: Axes, result: Limit, across: Quantity) -> None:
             axes.axvline(at, color=color, linestyle=style, label=f"{name}  {across.text_of(limit, DIGITS)}")
     if result.large_signal_limit is not None:
         axes.axvspan(result.large_signal_limit * across.factor, right, color=RED, alpha=0.06, linewidth=0.0)
+    if result.large_signal_lower_limit is not None:
+        axes.axvspan(left, result.large_signal_lower_limit * across.factor, color=RED, alpha=0.06, linewidth=0.0)
 
 
 def _title(result: Limit, across: Quantity) -> str:
     what, until = across.name, f", in runs of {result.horizon:g} s"
-    if result.large_signal_limit is not None:
-        return f"Good up to {across.text_of(result.large_signal_limit, DIGITS)}: {what}{until}"
+    low, high = (
+        None if limit is None else across.text_of(limit, DIGITS)
+        for limit in (result.large_signal_lower_limit, result.large_signal_limit)
+    )
+    if low is not None or high is not None:
+        between = (f"from {low}" if low else "", f"up to {high}" if high else "")
+        return f"Good {' '.join(filter(None, between))}: {what}{until}"
     first = result.tried[0]
-    return f"{what}: {'good throughout' if first.is_good else 'never good'}{until}"
+    if first.is_good:
+        return f"{what}: good throughout the scan{until}"
+    return f"{what}: not good at {across.text_of(first.value, DIGITS)}, where the scan begins{until}"
 
 
 def _quantity(result: Limit) -> Quantity:

@@ -7,7 +7,7 @@ from typing import Literal
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
 from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
-from orchestration.foundation.basics.bisection import Bracket, Range, bisected, first_failure
+from orchestration.foundation.basics.bisection import Bracket, Range, bisected, ends_of_good
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.number_text import quantity
@@ -86,9 +86,10 @@ def find(
             announce=announce, progress=report,
         )  # fmt: skip
         values = span.values()
-        bracket = first_failure(
+        lower, bracket = ends_of_good(
             trials.fails,
             values,
+            span.own,
             span.tolerance,
             parts=PARTS_OF_STEP,
             remaining=lambda most: trials.expect_remaining(most + BEYOND),
@@ -109,8 +110,9 @@ def find(
         of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else bound_of(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
-        local_accuracy=local.accuracy, mean_square_limit=mean_square.limit,
+        local_accuracy=local.accuracy, local_lower_limit=local.lower, mean_square_limit=mean_square.limit,
         large_signal_limit=None if bracket is None else bracket.good,
+        large_signal_lower_limit=None if lower is None else lower.good,
         refuted_limit=refuted, follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
         scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
@@ -147,7 +149,8 @@ def _mean_square(varied: Varied, span: Range, files: Files, local: LinearLimit) 
 _ALWAYS = ("local_limit", "large_signal_limit")
 """Fields that are shown also where they have no value"""
 _IN_ITS_UNIT = (
-    *_ALWAYS, "local_limit_outside", "local_accuracy", "mean_square_limit", "refuted_limit", "tolerance", "scan",
+    *_ALWAYS, "local_limit_outside", "local_accuracy", "local_lower_limit", "mean_square_limit",
+    "large_signal_lower_limit", "refuted_limit", "tolerance", "scan",
 )  # fmt: skip
 """Fields in the unit of the quantity"""
 _OF_UNITS = ("unit", "judged_unit")
@@ -224,6 +227,12 @@ def _note(
             f"that nine seeds in ten are good is refuted at {refuted:.6g}{span.unit}: {describe(trials.tried[refuted])}"
         )
     parts.append(f"what is narrower than the scan, {span.step:g}{span.unit}, is not seen")
+    if max(trials.tried) < span.values()[-1]:
+        parts.append(
+            f"scanned from {min(trials.tried):.6g} to {max(trials.tried):.6g}{span.unit}: beyond them nothing is known"
+        )
+    if found.lower is not None:
+        parts.append(f"below {found.lower:.6g}{span.unit} small deviations grow, too")
     if local is None:
         return [*parts, found.reason]
     measured = None if bracket is None else bracket.good

@@ -53,12 +53,17 @@ class Limit:
     local_limit_outside: float | None
     """Likewise for the quadrotor, with the gain that the law has just outside its boundary layer; None also without
     such a layer."""
+    local_lower_limit: float | None = None
+    """The value below which, down from the system's own, small errors do not decay either; None: none was found."""
     mean_square_limit: float | None = None
     """The value from which mean squares of the loop about its operating point have no finite expectation; None: nothing
     is random, or there is no such value in the range, or it cannot be determined."""
     large_signal_limit: float | None
     """The last value that is good from the scenario's own initial state; None: no value in the range failed, or the
     first did."""
+    large_signal_lower_limit: float | None = None
+    """The lowest value that is good, down from the system's own, which is good, too; None: none below it failed, or the
+    scan began elsewhere."""
     refuted_limit: float | None
     """The lowest evaluated value of a random quantity at which so many seeds fail that `RELIABILITY` is refuted at the
     confidence; None: nothing is random, or there is none in the range."""
@@ -94,16 +99,28 @@ class Limit:
         tolerance = quantity(self.tolerance, self.unit, DIGITS, self.scan)
         resolution = f"scan {shown(self.scan)}, tolerance {tolerance}"
         seeds = f", all of {self.seeds} seeds" if self.seeds > 1 else ""
-        good = self.large_signal_limit
-        failed = next((one for one in self.tried if not one.is_good and (good is None or one.value > good)), None)
-        if failed is None:
-            return f"{self.of} good throughout the scan, up to {shown(self.tried[-1].value)}{seeds} ({resolution})"
-        how = failed.outcome if failed.unmet is None else f"{failed.outcome}, {failed.unmet}"
-        fails = f"diverges at {shown(failed.value)}" if how == "diverged" else f"not at {shown(failed.value)}: {how}"
-        if good is None:
-            return f"{self.of} not good even at {shown(failed.value)}, where the scan begins: {how} ({resolution})"
+
+        def how(one: Evaluation) -> str:
+            return one.outcome if one.unmet is None else f"{one.outcome}, {one.unmet}"
+
+        def failing(one: Evaluation) -> str:
+            at = shown(one.value)
+            return f"diverges at {at}" if how(one) == "diverged" else f"not at {at}: {how(one)}"
+
+        low, good = self.large_signal_lower_limit, self.large_signal_limit
+        failed = [one for one in self.tried if not one.is_good]
+        under = [one for one in failed if low is not None and one.value < low][-1:]
+        over = [one for one in failed if (low is None or one.value > low) and (good is None or one.value > good)][:1]
         again = f"; good again at {some(map(shown, self.flies_above))}" if self.flies_above else ""
-        return f"{self.of} good up to {shown(good)}{seeds}; {fails}{again} ({resolution})"
+        if over and good is None:
+            begins = f"not good even at {shown(over[0].value)}, where the scan begins: {how(over[0])}"
+            return f"{self.of} {begins}{again} ({resolution})"
+        start = "" if low is None else f" from {shown(low)}"
+        if good is None:
+            start = start or " throughout the scan,"
+            good = self.tried[-1].value
+        fails = "".join(f"; {failing(one)}" for one in (*over, *under))
+        return f"{self.of} good{start} up to {shown(good)}{seeds}{fails}{again} ({resolution})"
 
     def __repr__(self) -> str:
         return f"<Limit: {self.verdict}>"
@@ -112,6 +129,7 @@ class Limit:
         """The form that notebooks show."""
         limits = {
             "last value that is good": self.large_signal_limit,
+            "lowest value that is good": self.large_signal_lower_limit,
             "local limit, of small errors at rest": self.local_limit,
             "mean-square limit": self.mean_square_limit,
             "refuted from": self.refuted_limit,

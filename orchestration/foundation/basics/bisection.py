@@ -1,8 +1,9 @@
-"""Search for the first value that fails: a scan upward, then bisection."""
+"""Search for the first value that fails, or for both ends of the good values: a scan, then bisection."""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -20,10 +21,19 @@ class Bracket(NamedTuple):
     """fails"""
 
 
+class Ends(NamedTuple):
+    """The ends of the values that do not fail; None: no value fails there."""
+
+    lower: Bracket | None
+    upper: Bracket | None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Range:
     """How a quantity is scanned: `before`, then from `first` in steps to `last`; then bisected to `tolerance`."""
 
+    own: float | None = None
+    """the value that the system itself has, from which the search goes up and down; None: it goes up from the first"""
     before: tuple[float, ...] = ()
     first: float
     step: float
@@ -35,7 +45,36 @@ class Range:
         """The values of the scan, in rising order."""
         count = math.floor((self.last - self.first) / self.step + 1e-9)
         steps = (float(f"{self.first + i * self.step:.12g}") for i in range(count + 1))
-        return [*(value for value in self.before if value < self.first), *steps]
+        values = [*(value for value in self.before if value < self.first), *steps]
+        if self.own is None:
+            return values
+        return sorted([self.own, *(value for value in values if not math.isclose(value, self.own))])
+
+
+def ends_of_good(
+    fails: Fails,
+    values: Sequence[float],
+    own: float | None,
+    tolerance: float,
+    *,
+    parts: int = 1,
+    remaining: ReportRemaining = lambda most: None,
+) -> Ends:
+    """The ends of the values that do not fail around `own`, by `first_failure` in both directions.
+
+    Without `own`, or where that fails, the search goes up from the first of `values`, and there is no lower end.
+    """
+    once = cache(fails)
+    most = len(values) + 2 * _most_trials(_widest(values), tolerance, parts)
+    remaining(most)
+    if own is None or once(own):
+        return Ends(None, first_failure(once, values, tolerance, parts=parts, remaining=remaining))
+    above = [own, *(value for value in values if value > own)]
+    below = [-own, *(-value for value in reversed(values) if value < own)]
+    down = len(below) + _most_trials(_widest(below), tolerance, parts)
+    upper = first_failure(once, above, tolerance, parts=parts, remaining=lambda most: remaining(most + down))
+    lower = first_failure(lambda value: once(-value), below, tolerance, parts=parts, remaining=remaining)
+    return Ends(None if lower is None or lower.good is None else Bracket(-lower.good, -lower.bad), upper)
 
 
 def first_failure(
@@ -52,7 +91,7 @@ def first_failure(
     do not fail need not be an interval: gaps narrower than these steps are not seen.
     """
     good = None
-    widest = max((b - a for a, b in pairwise(values)), default=0.0)
+    widest = _widest(values)
     for i, value in enumerate(values, start=1):
         remaining(len(values) - i + _most_trials(widest, tolerance, parts))
         if not fails(value):
@@ -85,6 +124,10 @@ def bisected(
         else:
             good = middle
     return Bracket(good, bad)
+
+
+def _widest(values: Sequence[float]) -> float:
+    return max((b - a for a, b in pairwise(values)), default=0.0)
 
 
 def _most_trials(width: float, tolerance: float, parts: int) -> int:

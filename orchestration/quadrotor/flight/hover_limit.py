@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
-from orchestration.foundation.basics.bisection import Range, first_failure
+from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.flight.hover import at_edge, at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
@@ -57,12 +57,12 @@ ABOUT_HOVER = KnownLoop(
 
 
 def local_limit(loop: HoverLoop, scenario: Scenario, of: str) -> float | None:
-    """Where the spectral radius first crosses one from below, in period or delay [s]; None: nowhere in the range."""
-    span = range_of(scenario.timing, of)
+    """Where the spectral radius first crosses one, up from the scenario's own period or delay [s]; None: nowhere."""
+    span, own = range_of(scenario.timing, of), Varied(request=scenario, of=of).own
     assert span is not None
     low = min((*span.before, span.first))
     fine = [low + 0.001 * i for i in range(int((span.last - low) / 0.001))]
-    bracket = first_failure(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, 1e-6)
+    bracket = ends_of_good(lambda value: radius(loop, scenario, of, value) >= 1.0, fine, own, 1e-6).upper
     return bracket.good if bracket is not None else None
 
 
@@ -89,7 +89,7 @@ def about_hover(scenario: Scenario, of: str) -> LinearLimit:
         outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
         method=HOVER,
         accuracy=None if limit is None else HOVER_ACCURACY * limit,
-        reason="the spectral radius about hover stays below one in the range, or above",
+        reason="the spectral radius about hover stays below one to the end of the range, or is above it from the start",
     )
 
 

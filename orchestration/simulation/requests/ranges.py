@@ -65,6 +65,12 @@ class Varied:
             raise UsageError(f"--of {self.of}: {words} a path, as connections.NAME.delay")
         return paths_in(self.request, self.of)
 
+    @cached_property
+    def own(self) -> float | None:
+        """The value that the unchanged system has; None: it has no number there, or several."""
+        values = {value_at(self.system, path) for path in self.paths}
+        return next((float(value) for value in values if len(values) == 1 and isinstance(value, Real)), None)
+
     def at(self, value: float) -> System:
         """The system with another value; raises `UsageError` for an invalid one."""
         with errors_in_own_terms(self.request):
@@ -80,7 +86,10 @@ def search_range(
     tolerance: float | None,
     scan: float | None,
 ) -> Range:
-    """The range in which a limit is searched; raises `UsageError` for an invalid one."""
+    """The range in which a limit is searched; raises `UsageError` for an invalid one.
+
+    Without `first` it contains the value of the system itself, from which the search goes up and down.
+    """
     for flag, value in (("from", first), ("to", last), ("tolerance", tolerance), ("scan", scan)):
         if value is not None and not isinstance(value, Real):
             raise UsageError(f"--{flag} {value}: expected a number")
@@ -97,9 +106,12 @@ def search_range(
         raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
     if known is not None and named is None and (first is None or last is None):
         inform(f"--of {varied.of}: searched from {low:g} to {high:g}{known.unit}; --from and --to set others")
+    before = known.before if known is not None and first is None else ()
+    own = varied.own if first is None else None
     step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
     return Range(
-        before=known.before if known is not None and first is None else (),
+        own=own if own is not None and min((*before, low)) <= own <= high else None,
+        before=before,
         first=low,
         step=step,
         last=high,

@@ -22,6 +22,8 @@ class LinearLimit:
     """A limit of small deviations, or of their mean squares; None: there is none, for a reason."""
 
     limit: float | None = None
+    lower: float | None = None
+    """The value below which, down from the system's own, small deviations grow as well"""
     outside: float | None = None
     """Limit of the quadrotor with the gain just outside of its boundary layer"""
     method: str | None = None

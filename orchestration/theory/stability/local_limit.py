@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.bisection import Range, first_failure
+from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
@@ -84,8 +84,11 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
             found = _first_growth(partial(_rate, at, instances, factor), span, TWINS_TOLERANCE, TWINS)
             if found.limit is None:
                 return found
-            near = (max(span.first, (1.0 - NEAR) * found.limit), min(span.last, (1.0 + NEAR) * found.limit))
-            if [_rate(at, instances, factor * OTHER_SIZE, value) > 0.0 for value in near] == [False, True]:
+            if all(
+                [_rate(at, instances, factor * OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
+                for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))
+                if end is not None
+            ):
                 return found if factor == 1.0 else replace(found, accuracy=NEAR * found.limit)
     return LinearLimit(
         reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
@@ -93,16 +96,25 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
     )
 
 
+def _near(end: float, span: Range) -> tuple[float, float]:
+    return max(min(span.values()), (1.0 - NEAR) * end), min(span.last, (1.0 + NEAR) * end)
+
+
 def _rate(at: Callable[[float], System], instances: Instances, factor: float, value: float) -> float:
     return growth_of(at(value), instances, factor).rate
 
 
 def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LinearLimit:
-    """The first value at which small deviations grow, by a scan and bisection."""
-    width = span.tolerance * finer
-    bracket = first_failure(lambda value: growth(value) > 0.0, span.values(), width)
-    if bracket is None or bracket.good is None:
-        return LinearLimit(
-            method=method, reason=f"small deviations {'decay' if bracket is None else 'grow'} throughout the range"
-        )
-    return LinearLimit(limit=0.5 * (bracket.good + bracket.bad), method=method, accuracy=width)
+    """The values between which small deviations decay, by a scan and bisection."""
+    width, values = span.tolerance * finer, span.values()
+    ends = ends_of_good(lambda value: growth(value) > 0.0, values, span.own, width)
+    lower, upper = (None if end is None or end.good is None else 0.5 * (end.good + end.bad) for end in ends)
+    reason = ""
+    if ends.upper is None:
+        start = "throughout the range" if lower is None else f"from {lower:.6g}{span.unit} to the end of the range"
+        reason = f"small deviations decay {start}"
+    elif upper is None:
+        reason = f"small deviations grow at {values[0]:.6g}{span.unit}, where the scan begins"
+    return LinearLimit(
+        limit=upper, lower=lower, method=method, accuracy=None if upper is None else width, reason=reason
+    )

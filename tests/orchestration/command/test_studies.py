@@ -228,7 +228,7 @@ def test_limit_prints_both_figures_notes_that_they_differ_and_draws_them_on_requ
     assert (float(local), unit) == (pytest.approx(80.0, abs=0.5), "ms")
     assert found["large_signal_limit"] == "-"
     assert not {"continuous", "flies_above", "refuted_limit", "confidence"} & found.keys()
-    assert (found["horizon"], found["scan"], found["tried"]) == ("50 ms", "5 ms", "5 values")
+    assert (found["horizon"], found["scan"], found["tried"]) == ("50 ms", "5 ms", "6 values")
     assert found["note"].endswith(f"; the local limit is {float(local) / 1e3:.6g} s")
 
 

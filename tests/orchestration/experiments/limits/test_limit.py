@@ -20,7 +20,7 @@ from orchestration.experiments.limits import limit as limits
 from orchestration.experiments.limits.evaluation import is_good
 from orchestration.experiments.limits.limit import as_text, find, shares_as_text
 from orchestration.experiments.limits.limit_result import ContinuousRun
-from orchestration.foundation.basics.bisection import Range, first_failure
+from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good, first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.foundation.basics.times import NANOSECONDS
@@ -137,6 +137,28 @@ def test_the_number_of_remaining_values_is_a_decreasing_bound(edge: float, toler
     assert all(bound >= really for bound, really in zip(reversed(bounds), range(len(bounds))))
     assert bounds == sorted(bounds, reverse=True)
     assert bounds[0] < len(values) + parts + 22  # halvings of the widest step to the finest tolerance
+
+
+def test_good_values_around_the_own_one_have_both_ends_and_those_apart_from_it_are_not_joined() -> None:
+    def fails(value: float) -> bool:
+        return not (1.0 <= value <= 1.2 or 2.3 < value < 4.6)
+
+    values = [float(i) for i in range(1, 9)]
+    lower, upper = ends_of_good(fails, values, 3.0, 0.125)
+    assert lower is not None
+    assert lower.good is not None
+    assert lower.bad <= 2.3 < lower.good <= lower.bad + 0.125
+    assert upper == first_failure(fails, values[2:], 0.125)
+    assert ends_of_good(fails, values, 7.0, 0.125) == (None, first_failure(fails, values, 0.125))
+    assert ends_of_good(lambda value: value > 4.6, values, 3.0, 0.5) == Ends(None, Bracket(4.5, 5.0))
+    assert ends_of_good(lambda value: value < 2.6, values, 3.0, 0.5) == Ends(Bracket(3.0, 2.5), None)
+
+
+def test_the_own_value_is_scanned_unless_the_start_is_given() -> None:
+    varied = Varied(request=example("dc_servo", {"connections.command.delay": 0.0047}), of="connections.command.delay")
+    span = search_range(varied, {}, first=None, last=None, tolerance=None, scan=None)
+    assert (span.own, span.values()[:4]) == (0.0047, [0.0, 0.003, 0.0047, 0.006])
+    assert search_range(varied, {}, first=0.001, last=None, tolerance=None, scan=None).own is None
 
 
 def test_steps_finer_than_the_tolerance_are_not_taken() -> None:
@@ -556,6 +578,24 @@ def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monke
     assert (coarse.scan, coarse.large_signal_limit) == (0.05, None), "as its help says, it sees no gap that small"
 
 
+def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def bound(self: StubPool, system: System) -> float:
+        return 0.01 if 0.0062 < at(system, "timing.period") < 0.0317 else math.inf
+
+    monkeypatch.setattr(stubbed, "bound", bound)
+    found = find(scenario_of(), "period")
+    assert found.verdict == (
+        "period good from 6.25 ms up to 31.5 ms; diverges at 31.75 ms; diverges at 6 ms (scan 5 ms, tolerance 0.5 ms)"
+    )
+    assert (found.large_signal_limit, found.large_signal_lower_limit) == (0.0315, 0.00625)
+    assert "scanned from 0.005 to 0.055 s: beyond them nothing is known" in found.note
+    from_below = find(scenario_of(), "period", first=0.005)
+    assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (None, None)
+    assert from_below.verdict.startswith("period not good even at 5 ms, where the scan begins: diverged; good again at")
+
+
 @pytest.mark.parametrize(
     ("bound", "expected"),
     [(1.0, "not at 30 ms: bounded, ultimate_bound = 1 m, expected < 0.05 m"), (math.inf, "diverges at 30 ms")],
@@ -659,7 +699,8 @@ def test_each_value_is_announced() -> None:
     lines: list[str] = []
     find(scenario_of(), "period", announce=lines.append)
     assert lines[0] == "engine compiled: native FMUs, one run at a time"
-    assert lines[1] == "period 0.001 s: settled"
+    assert lines[1] == "period 0.01 s: settled"
+    assert "period 0.001 s: settled" in lines
     assert "period 0.03 s: settled" in lines
     assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in lines
 
@@ -691,7 +732,8 @@ def test_find_runs_the_scenario_and_its_result_is_json() -> None:
     fields = json.loads(json.dumps(dataclasses.asdict(found)))
     assert fields.keys() == {
         "of", "unit", "judged", "judged_unit", "judged_bound", "local_limit", "local_method", "local_accuracy",
-        "local_limit_outside", "mean_square_limit", "large_signal_limit", "refuted_limit", "follows", "horizon",
+        "local_limit_outside", "local_lower_limit", "mean_square_limit", "large_signal_limit",
+        "large_signal_lower_limit", "refuted_limit", "follows", "horizon",
         "tolerance", "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
     limit = found.large_signal_limit

@@ -1,5 +1,6 @@
 """Local limits by twin runs, which a second pulse has to confirm."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -16,6 +17,22 @@ BLURRED = 0.2
 """Where the growth of a difference as small as the rounding of single precision seems to begin"""
 
 
+def at(value: float) -> System:
+    return System(stop_time=value, components={"one": Component(fmu="one.fmu", step=0.01)})
+
+
+def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    def growth(system: System, *_: Any, **__: Any) -> float:
+        return (system.stop_time - 0.31) * (system.stop_time - 0.52)
+
+    monkeypatch.setattr(local_limit, "growth_of_loop", growth)
+    found = local_limit.about_rest(at, replace(SPAN, own=0.4))
+    assert (found.lower, found.limit) == pytest.approx((0.31, 0.52), abs=1e-4)
+    assert local_limit.about_rest(at, SPAN).reason == "small deviations grow at 0.05 s, where the scan begins"
+    below = local_limit.about_rest(at, replace(SPAN, last=0.45, own=0.4))
+    assert below.reason == "small deviations decay from 0.309985 s to the end of the range"
+
+
 @pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, 0.5), (1e9, None)])
 def test_a_pulse_that_rounding_blurs_is_not_believed(
     monkeypatch: pytest.MonkeyPatch, enough: float, limit: float | None
@@ -29,9 +46,6 @@ def test_a_pulse_that_rounding_blurs_is_not_believed(
 
     monkeypatch.setattr(local_limit, "growth_of", growth)
     monkeypatch.setattr(local_limit, "growth_of_loop", refuse)
-
-    def at(value: float) -> System:
-        return System(stop_time=value, components={"one": Component(fmu="one.fmu", step=0.01)})
 
     found = local_limit.about_rest(at, SPAN)
     assert found.limit == (limit if limit is None else pytest.approx(limit, abs=1e-2))
