@@ -35,7 +35,8 @@ class Job:
     signals: tuple[str, ...]
     """see `assignment.Loop`"""
     recorded: Path
-    """a run of this project's master, as .npy: time and signals at the start of each step"""
+    """a run of this project's master, as .npy: time and signals at the end of initialisation, and at the start of each
+    step"""
     folder: Path
     """Folder for files of the tool"""
 

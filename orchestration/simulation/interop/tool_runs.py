@@ -59,7 +59,7 @@ class ToolRuns:
         self._master_rows: dict[tuple[str, str], Floats] = {}
         self._children: list[Child] = []
         self._lock, self._closed = threading.Lock(), False
-        np.save(folder / "recorded.npy", self.rows_of_master("gauss-seidel", {})[:-1])
+        np.save(folder / "recorded.npy", self._with_first_exchange("gauss-seidel", {})[:-1])
 
     def __enter__(self) -> "ToolRuns":
         return self
@@ -124,6 +124,10 @@ class ToolRuns:
 
     def rows_of_master(self, order: str, start: FirstInputs) -> Floats:
         """The run of this project's master: time and signals; a command is the one computed at the row's time."""
+        return self._with_first_exchange(order, start)[1:]
+
+    def _with_first_exchange(self, order: str, start: FirstInputs) -> Floats:
+        """The same after a row at 0 with the signals that were exchanged during initialisation."""
         key = (order, repr(start))
         if key not in self._master_rows:
             system = _in_order(_by_own_clocks(self._system, self._clocks), order, self.step)
@@ -136,7 +140,7 @@ class ToolRuns:
 
 
 def _rows(system: System, loop: AssignedLoop, start: FirstInputs) -> Floats | str:
-    """The time and the signals of a run here; or the reason why it ended early."""
+    """The time and the signals of a run here, at the end of its initialisation, too; or why it ended early."""
 
     def load(path: Path, instance_name: str, access: Access = USUAL) -> Instance:
         if not start:
@@ -145,10 +149,12 @@ def _rows(system: System, loop: AssignedLoop, start: FirstInputs) -> Floats | st
 
     with prepared(system, load=load) as run:
         run.master.initialise()
+        first = dict(zip(run.master.columns, run.master.board.row.tolist()))
         run.master.run()
         result = run.result()
     ended = result.divergence or result.termination
-    return ended or np.column_stack([result.signals[name] for name in ("time", *loop.signals)])
+    names = ("time", *loop.signals)
+    return ended or np.column_stack([np.append(first[name], result.signals[name]) for name in names])
 
 
 def parameters_for(tool: Tool, part: Part) -> dict[str, Parameter]:

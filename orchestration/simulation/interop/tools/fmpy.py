@@ -31,12 +31,13 @@ def run_controller(job: Job) -> Rows:
 
 
 def _run_alone(job: Job, component: str) -> Rows:
-    recorded = np.load(job.recorded)
+    recorded = np.load(job.recorded)[[0, *range(job.steps + 1)]]
     places = {signal: i for i, signal in enumerate(job.signals, start=1)}
     inputs = {name: places[".".join(start)] for start, (owner, name) in job.connections if owner == component}
     signals = np.zeros(len(recorded), dtype=[("time", np.float64), *((name, np.float64) for name in inputs)])
-    # fmpy's own points: an input is interpolated where its rows differ from them in the last bit.
-    signals["time"] = job.step * np.arange(len(recorded))
+    # fmpy's own points: an input is interpolated where its rows differ from them in the last bit. Two rows at 0 are a
+    # jump there, which it makes after initialisation if there is a row before.
+    signals["time"] = [-job.step, 0.0, *(job.step * np.arange(len(recorded) - 2))]
     for name, column in inputs.items():
         signals[name] = recorded[:, column]
     own = [signal.partition(".")[2] if signal.partition(".")[0] == component else None for signal in job.signals]

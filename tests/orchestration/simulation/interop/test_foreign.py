@@ -51,6 +51,25 @@ to = ["b.u"]
 to = ["a.u"]
 constant = 0.3
 """
+# A quadrotor whose motors begin at the thrust of initialisation, 0, which the first step jumps from.
+LIFTED = """
+stop_time = 0.1
+[components.plant]
+fmu = "QuadrotorPlant"
+step = 0.05
+parameters = { actuator_time_constant = 0.1 }
+[components.c]
+fmu = "small.fmu"
+sampling = { period = 0.05 }
+[[connections]]
+from = ["c.y"]
+to = ["plant.thrust"]
+[[connections]]
+from = ["plant.quaternion.w"]
+to = ["c.u"]
+[criterion]
+diverged = "abs(plant.velocity.z) > 1e9"
+"""
 
 
 def written(folder: Path, text: str) -> System:
@@ -79,6 +98,17 @@ def test_fmus_of_anybody_fly_as_in_other_masters(text: str, orders: dict[str, st
     for agreement in found:
         assert max(agreement.same_first_inputs.values()) <= TOLERANCE, agreement.tool.name
         assert agreement.trace.steps >= 39
+
+
+@needs_compiler
+def test_a_plant_alone_is_initialised_with_what_was_exchanged_then_and_not_with_the_first_command(
+    tmp_path: Path,
+) -> None:
+    small(tmp_path)
+    system = written(tmp_path, LIFTED)
+    (found,) = agreements(system, chosen(["fmpy, plant alone"], system.components))
+    assert found.trace.initial_inputs["plant"] != found.trace.first_inputs["plant"]
+    assert max(found.as_it_comes.values()) <= TOLERANCE
 
 
 @in_test_all
