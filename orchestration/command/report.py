@@ -7,6 +7,7 @@ import typer
 
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, build_option, result_of_files
+from orchestration.command.study_flags import STORE
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import progress_bar
 
@@ -24,11 +25,11 @@ def report(
         Path | None,
         option(
             "--out",
-            "The file; default: report_NAME.html here. Or the folder of the study's store, default results/NAME, "
-            "which the file is then written to.",
+            "The file, or the folder to write it to; default: report_NAME.html here.",
             "FILE.html|DIR",
         ),
     ] = None,
+    store: Annotated[Path | None, STORE] = None,
     flights: Annotated[
         int | None,
         option("--flights", "Number of runs of a study whose signals are embedded; default: 1000.", "N", min=0),
@@ -44,7 +45,7 @@ def report(
     if live and len(what) != 1:
         raise UsageError("--live: expected the directory of one run")
     with progress_bar("running") as progress:
-        written = write(*what, out=out, flights=flights, runs=run or [], progress=progress)
+        written = write(*what, out=out, store=store, flights=flights, runs=run or [], progress=progress)
     return result_of_files([written, *([_live(what[0], written)] if live else [])])
 
 

@@ -10,7 +10,7 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.printed_tables import TABLE
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
-from orchestration.command.study_flags import Dask, Out, StudyEngineFlag, TimeLimit, Workers
+from orchestration.command.study_flags import STORE, Dask, Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
 
@@ -139,9 +139,7 @@ def export(
 def draw(
     study: StudyFile,
     out: Annotated[Path | None, option("--out", "Folder of the figures; default: that of the store.", "DIR")] = None,
-    store: Annotated[
-        Path | None, option("--store", "Folder of the store; default: --out if it is there, else results/NAME.", "DIR")
-    ] = None,
+    store: Annotated[Path | None, STORE] = None,
     metric: Annotated[
         str | None, option("--metric", "Metric to draw; default: the first objective that varies.")
     ] = None,
@@ -151,15 +149,12 @@ def draw(
     """Draw a study: a metric over one or two axes with the good region, or sensitivity bars."""
     with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
         from orchestration.experiments.studies.drawing import draw_study, expect_metric
-        from orchestration.experiments.studies.store import store_path
+        from orchestration.experiments.studies.store import store_folder
         from orchestration.experiments.studies.study_file import load_study
 
         loaded = load_study(study)
         expect_metric(loaded, metric)
-        if store is not None and store.name == store_path(loaded.name, store).name:
-            store = store.parent
-        if store is None and out is not None and store_path(loaded.name, out).is_file():
-            store = out
+        store = store_folder(loaded.name, store, out)
         _current_store(study, store)
         return result_of_files(draw_study(loaded, store, metric, look.figure_style, progress, out=out))
 

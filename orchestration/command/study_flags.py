@@ -7,6 +7,8 @@ from orchestration.command.options import option
 
 Out = Annotated[Path | None, option("--out", "Folder of the store; default: results/NAME.", "DIR")]
 
+STORE = option("--store", "Folder of the store; default: --out if it is there, else results/NAME.", "DIR")
+
 Workers = Annotated[int, option("--workers", "Processes on this machine.", "N")]
 
 Dask = Annotated[str | None, option("--dask", "A dask scheduler instead, e.g. tcp://host:8786.", "URL")]

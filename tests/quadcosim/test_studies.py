@@ -45,6 +45,23 @@ def test_a_sweep_is_not_flown_twice_and_tells_its_progress(swept: Swept) -> None
     assert repr(again) == f"<Swept: 2 runs, 0 of them new, in {again.path}>"
 
 
+def test_a_report_is_of_what_python_has_returned_or_of_what_it_was_made_of(swept: Swept, tmp_path: Path) -> None:
+    axis = {"name": "timing.period", "values": [0.01, 0.02]}
+    content = {"name": "periods", "base": native(stop_time=0.1), "axes": [axis]}
+    written = [
+        quadcosim.report(what, out=tmp_path / "a.html", store=store, flights=1).read_text()
+        for what, store in ((swept, None), (STUDY, swept.path.parent), (content, swept.path))
+    ]
+    assert written[0] == written[1] == written[2]
+    assert quadcosim.report(swept, out=tmp_path, flights=1) == tmp_path / "report_periods.html"
+    with pytest.raises(
+        UsageError, match="report: 3: expected a Result, a Study, a Comparison or what sweep or compare"
+    ):
+        quadcosim.report(3)  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="store: expected a study file or a comparison file with it"):
+        quadcosim.report(swept.path, out=tmp_path / "b.html", store=tmp_path)
+
+
 MARGIN = 2.0
 
 

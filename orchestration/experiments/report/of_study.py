@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
-from orchestration.experiments.report.model import OtherStudy, Report, ReportRun, ReportShare, Setting
-from orchestration.experiments.report.repeated import repeated_maps
+from orchestration.experiments.report.model import OtherStudy, RepeatedMaps, Report, ReportRun, ReportShare, Setting
+from orchestration.experiments.report.repeated import maps_of_both, repeated_maps
 from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
@@ -98,7 +98,10 @@ def study_report(
     by_chance = is_sample(stored, study)
     overall = _overall(stored, study)
     words = words_of(stored, study)
-    repeated = None if study is None or other is not None else repeated_maps(study, stored.rows, axes)
+    repeated = _repeated(study, stored, axes)
+    if other is not None:
+        over = _over(*other, axes=axes, of=name, blobs=blobs)
+        repeated = maps_of_both((name, repeated), (other[0], _repeated(other[2], other[1], axes)))
     return Report(
         kind="study",
         title=name,
@@ -122,11 +125,15 @@ def study_report(
             if repeated is None and (along := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
         ),
         repeated=repeated,
-        other=None if other is None else _over(*other, axes=axes, of=name, blobs=blobs),
+        other=None if other is None or repeated is not None else over,
         contents=tuple(embedded.contents),
         provenance=tuple(provenance_of(stored.about)),
         command=command,
     )  # fmt: skip
+
+
+def _repeated(study: Study | None, stored: Stored, axes: Sequence[ColumnAxis]) -> RepeatedMaps | None:
+    return None if study is None else repeated_maps(study, stored.rows, axes)
 
 
 def _over(

@@ -4,61 +4,71 @@ import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orchestration.experiments.report import html, of_runs
-from orchestration.experiments.report.sources import report_of
+from orchestration.experiments.report.sources import report_of, source_of
 from orchestration.experiments.report.subset import Progress, Wanted
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.runs.result import Result
+
+if TYPE_CHECKING:
+    from orchestration.experiments.comparison.design import Comparison
+    from orchestration.experiments.comparison.run import Compared
+    from orchestration.experiments.studies.study import Study
+    from orchestration.experiments.studies.study_file import FileLike
+    from orchestration.experiments.studies.swept import Swept
 
 ENDINGS = (".html", ".htm")
 
 
 def report(
-    *what: Result | str | Path,
+    *what: "Result | Study | Swept | Comparison | Compared | FileLike",
     out: str | Path | None = None,
+    store: str | Path | None = None,
     flights: int | None = None,
     runs: Sequence[int] = (),
     progress: Progress | None = None,
 ) -> Path:
     """Write one HTML file of results or directories of runs, or of a study, its store or a comparison; its path.
 
-    Of two studies over the same axes the second is drawn over the first. The file is self-contained. `out` is the file,
-    by default `report_NAME.html`, or the folder of the store of the study, by default `results/NAME`, which the file is
-    then written to. Of a study, the signals of `flights` runs are included, those of the runs with the numbers `runs`
-    among them.
+    A study or a comparison is also what `sweep` or `compare` has returned, or the content of its file. Of two studies
+    over the same axes the second is drawn over the first. The file is self-contained. `out` is the file, by default
+    `report_NAME.html`, or the folder to write it to; `store` is the folder of the store of the study, by default `out`
+    if it is there, else `results/NAME`. Of a study, the signals of `flights` runs are included, those of the runs with
+    the numbers `runs` among them.
 
     Raises `UsageError` for anything else.
     """
     if not what:
         raise UsageError("report: expected runs, a study or a comparison")
-    for each in what:
-        if not isinstance(each, (Result, str, os.PathLike)):
-            raise UsageError(
-                f"report: {shown(repr(each))}: expected a Result, or the path of a run, a study or a store"
-            )
-    paths = [Path(each) for each in what if not isinstance(each, Result)]
     results = [each for each in what if isinstance(each, Result)]
-    name = f"report_{paths[0].resolve().stem if paths else 'run'}.html"
-    to = Path(name if out is None else out)
-    folder = to if to.is_dir() else None
-    if folder is not None:
-        to = folder / name
-    elif to.suffix.lower() not in ENDINGS:
-        raise UsageError(f"--out {to}: expected a file that ends in .html, or the folder of a store")
-    command = _command(paths, folder, flights, runs)
+    if results and len(results) < len(what):
+        raise UsageError("report: expected results alone, or paths of them")
+    folder = Path(out) if out is not None and Path(out).is_dir() else None
+    first = None if store is None else Path(store)
+    sources = [] if results else [source_of(each, first if i == 0 else None, folder) for i, each in enumerate(what)]
+    name = f"report_{sources[0].name if sources else 'run'}.html"
+    to = Path(name if out is None else out) if folder is None else folder / name
+    if to.suffix.lower() not in ENDINGS:
+        raise UsageError(f"--out {to}: expected a file that ends in .html, or a folder")
     if results:
-        if paths:
-            raise UsageError("report: expected results or paths, not both")
         named = {f"run {number}" if len(results) > 1 else "run": one for number, one in enumerate(results, start=1)}
-        return html.write(of_runs.runs_report(named, "quadcosim.report(...) in Python"), to)
-    wanted = Wanted(required=runs, most=flights, progress=progress)
-    return html.write(report_of(paths, command, wanted, store=folder), to)
+        return html.write(of_runs.runs_report(named, IN_PYTHON), to)
+    paths = [str(each) for each in what if isinstance(each, (str, os.PathLike))]
+    command = _command(paths, folder, first, flights, runs) if len(paths) == len(what) else IN_PYTHON
+    return html.write(report_of(sources, command, Wanted(required=runs, most=flights, progress=progress)), to)
 
 
-def _command(what: Sequence[Path], folder: Path | None, flights: int | None, runs: Sequence[int]) -> str:
+IN_PYTHON = "quadcosim.report(...) in Python"
+
+
+def _command(
+    what: Sequence[str], folder: Path | None, store: Path | None, flights: int | None, runs: Sequence[int]
+) -> str:
     """The command that makes this report."""
-    words = ["quadcosim", "report", *map(str, what)]
+    words = ["quadcosim", "report", *what]
     words += ["--out", str(folder)] if folder is not None else []
+    words += ["--store", str(store)] if store is not None else []
     words += ["--flights", str(flights)] if flights is not None else []
     return shlex.join([*words, *(word for index in runs for word in ("--run", str(index)))])

@@ -31,6 +31,16 @@ def store_path(study: str, folder: str | Path | None = None) -> Path:
     return Path(folder or Path("results") / study) / "study.sqlite"
 
 
+def store_folder(study: str, store: Path | None, out: Path | None) -> Path | None:
+    """The folder of a study's store; default: `out` if it is there, else None, that of `store_path`.
+
+    `store` may also be the path of its file.
+    """
+    if store is not None:
+        return store.parent if store.name == store_path(study, store).name else store
+    return out if out is not None and store_path(study, out).is_file() else None
+
+
 DesignPoint = tuple[int, str, str]
 """One point of a design: its index, the key of its run, and the value of each axis as JSON"""
 

@@ -1,14 +1,18 @@
 """Maps of a study that repeats, in its report: they fold the seeds, and end with the difference of two laws."""
 
+from collections.abc import Callable
 from typing import Any
 
-from orchestration.experiments.report.model import CellMap, MapCell
-from orchestration.experiments.report.repeated import repeated_maps
+import pytest
+
+from orchestration.experiments.report.model import CellMap, MapCell, RepeatedMaps
+from orchestration.experiments.report.repeated import maps_of_both, repeated_maps
 from orchestration.experiments.report.tables import ColumnAxis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.shares import interval_of_difference
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.statistics import wilson
+from quadcosim import UsageError
 from tests.orchestration.experiments.studies.common import axis, study
 
 LAWS = axis("controller", "UnifiedController", "CascadedController")
@@ -17,17 +21,27 @@ PERIODS, LOSSES, SEEDS = axis("timing.period", 0.01, 0.02), axis("timing.loss", 
 
 def maps_of(chosen: Study) -> tuple[CellMap, ...] | None:
     """The maps where the second law is good at 10 ms without loss alone, and the first everywhere."""
-    rows: list[dict[str, Any]] = []
-    for i in range(len(chosen.points)):
-        point = chosen.points[i]
-        good = point.get("controller") != "CascadedController" or (point["timing.period"], point["timing.loss"]) == (
-            0.01,
-            0.0,
-        )
-        rows.append({"design_index": i, "settings": point, "status": "done", "good": int(good)})
-    axes = [ColumnAxis(name=each.name, quantity=quantity_of(each, {"timing.period": "s"})) for each in chosen.axes]
-    found = repeated_maps(chosen, rows, axes)
+    found = maps_with(
+        chosen,
+        lambda at: (
+            at.get("controller") != "CascadedController" or (at["timing.period"], at["timing.loss"]) == (0.01, 0.0)
+        ),
+    )
     return None if found is None else found.maps
+
+
+def maps_where(chosen: Study, bad: tuple[float, float] | None) -> RepeatedMaps | None:
+    """The maps where one period with a loss is bad."""
+    return maps_with(chosen, lambda at: (at["timing.period"], at["timing.loss"]) != bad)
+
+
+def maps_with(chosen: Study, is_good: Callable[[dict[str, Any]], bool]) -> RepeatedMaps | None:
+    rows: list[dict[str, Any]] = [
+        {"design_index": i, "settings": point, "status": "done", "good": int(is_good(point))}
+        for i, point in enumerate(chosen.points)
+    ]
+    axes = [ColumnAxis(name=each.name, quantity=quantity_of(each, {"timing.period": "s"})) for each in chosen.axes]
+    return repeated_maps(chosen, rows, axes)
 
 
 def cell(of: CellMap, x: float, y: float) -> MapCell:
@@ -51,6 +65,25 @@ def test_two_laws_have_a_map_each_and_one_of_their_difference() -> None:
     shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 1.0), ends)]
     assert (apart.low, apart.high) == interval_of_difference(*shares)
     assert apart.runs == (9, 10, 11, 21, 22, 23)
+
+
+def test_two_studies_have_their_own_maps_and_the_difference_of_both() -> None:
+    chosen = study(PERIODS, LOSSES, SEEDS, repeat="seed")
+    both = [maps_where(chosen, bad) for bad in (None, (0.02, 0.1))]
+    found = maps_of_both(("a", both[0]), ("b", both[1]))
+    assert found is not None
+    first, second, difference = found.maps
+    assert [one.title for one in found.maps] == ["a: share settled", "b: share settled", "difference, b minus a"]
+    assert cell(second, 20.0, 0.1).text == "0/3"
+    assert (cell(first, 20.0, 0.1).runs, cell(second, 20.0, 0.1).runs) == ((9, 10, 11), ())
+    apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(3, 3))
+    shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 1.0), ends)]
+    assert (apart.low, apart.high) == interval_of_difference(*shares)
+    assert (apart.value, apart.runs) == (-1.0, (9, 10, 11))
+    assert cell(difference, 10.0, 0.0).said == "0 %, nothing is random"
+    with pytest.raises(UsageError, match=r"b: expected the same design\.repeat and order of axes as a"):
+        maps_of_both(("a", both[0]), ("b", None))
+    assert maps_of_both(("a", None), ("b", None)) is None
 
 
 def test_other_studies_keep_the_map_of_their_runs() -> None:
