@@ -59,8 +59,22 @@ def test_no_output_moves_at_first_with_what_it_is_not_declared_to_depend_on(mode
             )
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_every_variable_says_what_it_is(model: str) -> None:
+    module, _, name = MODELS[model].partition(":")
+    slave = getattr(importlib.import_module(module), name)
+    for variable in slave.variables:
+        assert variable.description, (
+            f"{model}.{variable.name}: expected a description, as the first argument of its declaration in "
+            f"{module.partition('.')[0]}/"
+        )
+
+
 def test_every_reduction_has_its_form_in_lanes() -> None:
-    assert set(REDUCTIONS) == set(LANES)
+    assert set(REDUCTIONS) == set(LANES), (
+        f"{set(REDUCTIONS) ^ set(LANES)}: expected each reduction of orchestration/systems/expressions/reductions.py in "
+        f"LANES of orchestration/simulation/engines/batch/folds.py, and no other"
+    )
 
 
 def test_the_page_of_systems_has_every_function_of_the_language() -> None:

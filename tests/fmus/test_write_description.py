@@ -13,6 +13,8 @@ from fmpy.model_description import ModelDescription, ScalarVariable
 from fmu_kit.write_description import PYTHON_REQUIRED
 from orchestration.components.building.models import MODELS
 from orchestration.foundation.basics.documents import read_toml
+from plant_fmu.interface import PlantInterface
+from plant_fmu.observed import Observed
 from tests.fmus.archive import files_of
 from tests.fmus.expected import MEASUREMENT
 from tests.fmus.instance import Instance
@@ -50,12 +52,17 @@ def test_every_variable_is_as_the_interface_says(description: ModelDescription) 
         assert [row_of(v) for v in description.modelVariables if v.name == row.name] == [row]
 
 
+OBSERVED = {v.name for v in Observed.variables} - {v.name for v in PlantInterface.variables}
+"""What a plant has beside its interface: tests/plant_fmu/test_observed.py has each, with its unit"""
+
+
 def test_no_input_or_output_is_missing_from_the_interface(description: ModelDescription) -> None:
     def ports(variables: Iterator[tuple[str, str]]) -> set[str]:
-        return {name for name, causality in variables if causality in ("input", "output")}
+        return {name for name, causality in variables if causality in ("input", "output") and name not in OBSERVED}
 
     declared = ports((v.name, v.causality) for v in description.modelVariables)
-    assert declared == ports((row.name, row.causality) for row in TABLES[description.modelName])
+    table = ports((row.name, row.causality) for row in TABLES[description.modelName])
+    assert declared == table, f"{declared ^ table}: expected the same in tests/fmus/interface_table.py"
 
 
 def test_bounds_are_declared(description: ModelDescription) -> None:
@@ -174,9 +181,11 @@ def test_declared_initial_dependencies_are_the_inputs_that_a_controller_uses_and
     idle = IDLE.get(description.modelName, set())
     inputs = [v.name for v in description.modelVariables if v.causality == "input" and v.name not in idle]
     expected = [] if description.modelName == "QuadrotorPlant" else inputs
-    outputs = {v.name for v in description.modelVariables if v.causality == "output"}
+    outputs = {v.name for v in description.modelVariables if v.causality == "output" and v.name not in OBSERVED}
     declared = {
-        u.variable.name: [d.name for d in u.dependencies if d.causality == "input"] for u in description.initialUnknowns
+        u.variable.name: [d.name for d in u.dependencies if d.causality == "input"]
+        for u in description.initialUnknowns
+        if u.variable.name not in OBSERVED
     }
     assert declared == dict.fromkeys(outputs, expected)
 
@@ -187,6 +196,7 @@ def test_declared_initial_dependencies_are_the_parameters_of_a_controller_and_wh
     declared = {
         u.variable.name: [d.name for d in u.dependencies if d.causality == "parameter"]
         for u in description.initialUnknowns
+        if u.variable.name not in OBSERVED
     }
     if description.modelName == "QuadrotorPlant":
         assert declared["position.y"] == ["initial.position.y"]

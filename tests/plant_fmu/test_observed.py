@@ -34,28 +34,39 @@ class Seen:
         return np.array([0.5, -0.2, 0.1]) * math.cos(2.0 * self.t)
 
 
-KNOWN: dict[str, Callable[[Seen], Any]] = {
-    "acceleration": lambda at: (at.wind + np.array([0.0, 0.4, 0.0]) - 12.0 * at.R[2]) / 1.3 + [0.0, 0.0, 9.7],
-    "wind.force": lambda at: at.wind,
-    "tilt": lambda at: math.acos(at.R[2, 2]),
+KNOWN: dict[str, tuple[str, Callable[[Seen], Any]]] = {
+    "acceleration": ("m/s2", lambda at: (at.wind + np.array([0, 0.4, 0]) - 12.0 * at.R[2]) / 1.3 + [0.0, 0.0, 9.7]),
+    "wind.force": ("N", lambda at: at.wind),
+    "tilt": ("rad", lambda at: math.acos(at.R[2, 2])),
 }
-"""The value of each, written independently of `plant_fmu`; a vector by its stem"""
+"""Unit and value of each, written independently of `plant_fmu`; a vector by its stem"""
 
 AXES = "xyz"
 OF_PLANT = {v.name for v in PlantInterface.variables}
 NAMES = [v.name for v in Observed.variables if v.name not in OF_PLANT]
 
 
-def known(name: str, at: Seen) -> float:
+def known(name: str) -> tuple[str, Callable[[Seen], Any]]:
+    """Unit and value of a variable, or of a part of one."""
     stem, _, axis = name.rpartition(".")
     is_part = stem != "" and axis in AXES
     whole = stem if is_part else name
     assert whole in KNOWN, (
-        f"plant_fmu/observed.py declares {whole}: expected its value, by an independent formula, as a line "
-        f'"{whole}": lambda at: … of KNOWN in tests/plant_fmu/test_observed.py'
+        f"plant_fmu/observed.py declares {whole}: expected its unit, and its value by an independent formula, as a "
+        f'line "{whole}": ("UNIT", lambda at: …) of KNOWN in tests/plant_fmu/test_observed.py'
     )
-    value = KNOWN[whole](at)
-    return float(value[AXES.index(axis)] if is_part else value)
+    unit, value = KNOWN[whole]
+    return unit, (lambda at: value(at)[AXES.index(axis)]) if is_part else value
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_observed_has_its_unit(name: str) -> None:
+    (declared,) = (v.unit for v in Observed.variables if v.name == name)
+    unit, _ = known(name)
+    assert declared == unit, (
+        f"{name} is declared in {declared}: expected the unit that KNOWN in tests/plant_fmu/test_observed.py has, "
+        f"{unit}, as the second argument of its declaration in plant_fmu/observed.py"
+    )
 
 
 @pytest.mark.parametrize("steps", [0, 20])
@@ -65,7 +76,7 @@ def test_what_is_observed_has_its_known_value(name: str, steps: int) -> None:
     run_steps(slave, 0.05, steps)
     position, velocity, attitude, spin = (np.array(get(slave, *of)) for of in (POSITION, VELOCITY, QUATERNION, SPIN))
     at = Seen(t=0.05 * steps, position=position, velocity=velocity, R=rotation(attitude), spin=spin)
-    expected = pytest.approx(known(name, at), rel=1e-12, abs=1e-12)
-    assert get(slave, name) == [expected], (
+    _, value = known(name)
+    assert get(slave, name) == [pytest.approx(float(value(at)), rel=1e-12, abs=1e-12)], (
         f"{name}: expected `observe` in plant_fmu/observed.py to set it as KNOWN has it"
     )
