@@ -1,8 +1,10 @@
 """Systems run in SIMD lanes with their signals, compared with the same systems run one after another."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import pytest
 
 from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import read_model
@@ -11,7 +13,11 @@ from orchestration.simulation.engines.batch.shape import Shape, outline
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.engines.structures import structures
 from orchestration.simulation.runs.result import Result
+from orchestration.systems.expressions.operators import OPERATORS
+from orchestration.systems.expressions.syntax import Call, Node, Operation, children, parse
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
+from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 
 
@@ -53,3 +59,46 @@ def assert_the_same_signals(shape: Shape, found: BatchResult, lane: int, alone: 
     assert differing == []
     assert found.outcome[lane] == structures(shape.lanes).RUNNING or alone.metrics["divergence_time"] is not None
     assert found.steps[lane] == alone.metrics["steps"]
+
+
+LOOP = System(
+    stop_time=1.0,
+    components={
+        "plant": Component(fmu="stub", step=0.01),
+        "controller": Component(fmu="stub", sampling=Sampling(period=0.02, jitter=0.01)),
+    },
+    connections=(
+        Connection(name="measured", start=("plant.y",), end=("controller.u0y",), noise={"y": 0.1}, loss=0.2),
+        Connection(name="commanded", start=("controller.y",), end=("plant.u1y",), hold="first", delay=0.03),
+        Connection(name="applied", start=("controller.z",), end=("plant.u2y",), delay_jitter=0.01),
+    ),
+)
+
+EXACT = {"max", "min", "first", "last", "peak_time", "settling_time", "growth_share"}
+"""Reductions that add nothing up: they have the same bits"""
+OF_PROCESSOR = {"sin", "cos", "tan", "asin", "acos", "atan2", "tanh", "exp", "log", "**"}
+"""Functions of numpy whose last bit depends on the processor"""
+
+
+def assert_the_same_numbers(system: System, found: Mapping[str, Any], alone: Mapping[str, Any]) -> None:
+    """Assert that metrics are those of the same run alone: sums to 1e-12, all else to the bit."""
+    assert list(found) == list(alone)
+    for name, value in alone.items():
+        expression = system.objectives.get(name)
+        if expression is None or value is None or _functions(parse(expression)) <= EXACT | {*OPERATORS} - OF_PROCESSOR:
+            assert (name, found[name]) == (name, value), _where(name, expression)
+        else:
+            assert found[name] == pytest.approx(value, rel=1e-12, abs=0.0), _where(name, expression)
+
+
+def _functions(node: Node) -> set[str]:
+    """The words of all operators and functions in it."""
+    here = {node.sign} if isinstance(node, Operation) else {node.function} if isinstance(node, Call) else set()
+    return here.union(*map(_functions, children(node)))
+
+
+def _where(name: str, expression: str | None) -> str:
+    return (
+        f"{name} = {expression}: expected the same in lanes, by folds.py in orchestration/simulation/engines/batch, as "
+        f"in Python, by reductions.py and operators.py in orchestration/systems/expressions"
+    )
