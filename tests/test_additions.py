@@ -72,8 +72,8 @@ def test_every_variable_says_what_it_is(model: str) -> None:
 
 def test_every_reduction_has_its_form_in_lanes() -> None:
     assert set(REDUCTIONS) == set(LANES), (
-        f"{set(REDUCTIONS) ^ set(LANES)}: expected each reduction of orchestration/systems/expressions/reductions.py in "
-        f"LANES of orchestration/simulation/engines/batch/folds.py, and no other"
+        f"{set(REDUCTIONS) ^ set(LANES)}: expected each reduction of orchestration/systems/expressions/reductions.py "
+        f"in LANES of orchestration/simulation/engines/batch/folds.py, and no other"
     )
 
 
