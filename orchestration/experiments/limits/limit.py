@@ -228,9 +228,9 @@ def _note(
         )
     parts.append(f"what is narrower than the scan, {span.step:g}{span.unit}, is not seen")
     if max(trials.tried) < span.values()[-1]:
-        parts.append(
-            f"scanned from {min(trials.tried):.6g} to {max(trials.tried):.6g}{span.unit}: beyond them nothing is known"
-        )
+        least, most = min(trials.tried), max(trials.tried)
+        where = f"from {least:.6g} to {most:.6g}{span.unit}" if least < most else f"only {least:.6g}{span.unit}"
+        parts.append(f"scanned {where}: beyond that nothing is known")
     if found.lower is not None:
         parts.append(f"below {found.lower:.6g}{span.unit} small deviations grow, too")
     if local is None:

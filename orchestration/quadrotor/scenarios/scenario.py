@@ -26,7 +26,7 @@ from orchestration.systems.system.description import describe_varying
 from orchestration.systems.system.distribution import Distribution, parsed_fields
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.requirements import is_finite
+from orchestration.systems.system.requirements import require_positive
 from orchestration.systems.system.starts import InitialConditions, Starts
 from orchestration.systems.system.vehicle import Vehicle
 
@@ -71,8 +71,7 @@ class Scenario:
     """The variables to record beside those that the two FMUs exchange."""
 
     def __post_init__(self) -> None:
-        if not (is_finite(self.stop_time) and self.stop_time > 0.0):
-            raise UsageError(f"stop_time = {shown(self.stop_time)}: expected a positive number of seconds")
+        require_positive(self, "stop_time")
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
             raise UsageError(f"seed = {shown(self.seed)}: expected a whole number from 0 to 2^63 - 1")
         for name, flag in ((SAMPLE_PERIOD, "--period and --clock"), (SAMPLE_OFFSET, "--offset")):

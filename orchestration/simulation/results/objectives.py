@@ -10,6 +10,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
+from orchestration.foundation.basics.unit_algebra import after
 from orchestration.foundation.recording.recording import Chunk, Events, InMemory, Recording
 from orchestration.systems.expressions.over_run import Recorded, Spans, evaluate, expect_names, vectors
 from orchestration.systems.expressions.syntax import Name, Node, Number, Operation, names, parse
@@ -285,7 +286,7 @@ def _missed(part: Node, metrics: Mapping[str, Any], units: Mapping[str, str]) ->
             value = metrics[name]
             if value is not None and _HOLDS[operation](value, bound):
                 return None
-            unit = f" {units[name]}" if name in units else ""
+            unit = after(units.get(name))
             text = "has no value" if value is None else f"= {value:.4g}{unit}"
             return f"{name} {text}, expected {operation} {bound:g}{unit}"
     return None

@@ -12,7 +12,7 @@ from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
 from orchestration.theory.stability.loop_at_rest import KnownTangents
-from orchestration.theory.stability.operating_point import NotAnEquilibriumError
+from orchestration.theory.stability.operating_point import NotAnEquilibriumError, deterministic
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
 
@@ -47,6 +47,11 @@ def local_limits(varied: Varied, span: Range) -> LinearLimit:
 def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
     """The local limit of any system; `at` makes the system for a value of the quantity."""
     try:
+        if deterministic(at(span.first)) == deterministic(at(span.last)):
+            return LinearLimit(
+                reason="no local limit: small deviations are judged at the operating point, without randomness and "
+                "quantisation, where this quantity changes nothing"
+            )
         with closing(Instances()) as instances:
             return _through_saved_states(at, span, instances)
     except NotAnEquilibriumError as error:

@@ -590,7 +590,7 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
         "period good from 6.25 ms up to 31.5 ms; diverges at 31.75 ms; diverges at 6 ms (scan 5 ms, tolerance 0.5 ms)"
     )
     assert (found.large_signal_limit, found.large_signal_lower_limit) == (0.0315, 0.00625)
-    assert "scanned from 0.005 to 0.055 s: beyond them nothing is known" in found.note
+    assert "scanned from 0.005 to 0.055 s: beyond that nothing is known" in found.note
     from_below = find(scenario_of(), "period", first=0.005)
     assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (None, None)
     assert from_below.verdict.startswith("period not good even at 5 ms, where the scan begins: diverged; good again at")

@@ -28,6 +28,7 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     monkeypatch.setattr(local_limit, "growth_of_loop", growth)
     found = local_limit.about_rest(at, replace(SPAN, own=0.4))
     assert (found.lower, found.limit) == pytest.approx((0.31, 0.52), abs=1e-4)
+    assert "this quantity changes nothing" in local_limit.about_rest(lambda value: at(0.4), SPAN).reason
     assert local_limit.about_rest(at, SPAN).reason == "small deviations grow at 0.05 s, where the scan begins"
     below = local_limit.about_rest(at, replace(SPAN, last=0.45, own=0.4))
     assert below.reason == "small deviations decay from 0.309985 s to the end of the range"
