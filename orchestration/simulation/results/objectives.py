@@ -12,7 +12,7 @@ from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.basics.unit_algebra import after
 from orchestration.foundation.recording.recording import Chunk, Events, InMemory, Recording
-from orchestration.systems.expressions.over_run import Recorded, Spans, evaluate, expect_names, vectors
+from orchestration.systems.expressions.over_run import Recorded, Spans, evaluate, expect_names, expect_number, vectors
 from orchestration.systems.expressions.syntax import Name, Node, Number, Operation, names, parse
 from orchestration.systems.system.model import DIVERGED, TERMINATED, System, expressions
 from orchestration.systems.system.request import Request, system_of
@@ -176,9 +176,11 @@ def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Boolean
 def with_available_objectives(system: System, signals: set[str], numbers: set[str]) -> System:
     """`system` without the optional objectives whose variables its FMUs do not have.
 
-    Raises `UsageError` for an expression with an unknown name, and for a name that is taken.
+    Raises `UsageError` for an expression with an unknown name or with a value at each instant, and for a name that is
+    taken.
     """
     valid = {"time", "stop_time", *signals, *vectors(dict.fromkeys(signals)), *numbers}
+    courses = valid - numbers - {"stop_time"}
     available = {}
     for name, text in system.objectives.items():
         if name in (*FIXED, *PRINTED):
@@ -188,6 +190,7 @@ def with_available_objectives(system: System, signals: set[str], numbers: set[st
         if name in system.optional and not valid.issuperset(names(parse(text))):
             continue
         expect_names(parse(text), valid, f"objectives.{name}")
+        expect_number(parse(text), courses, f"objectives.{name}")
         available[name] = text
         valid.add(name)
     for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):

@@ -268,6 +268,17 @@ def job_terms(expressions: Iterable[str]) -> dict[str, None]:
     return dict.fromkeys(name for text in expressions for name in names(parse(text)) if names_job_measure(name))
 
 
+def expect_number(node: Node, courses: set[str], place: str) -> None:
+    """Raise `UsageError` for an expression of which a part outside the functions over a run is one of `courses`."""
+    if isinstance(node, Name) and node.text in courses:
+        raise UsageError(
+            f"{place}: {node.text} has a value at each instant; expected one number of the run, as max(…) or last(…)"
+        )
+    if not (isinstance(node, Sampled) or (isinstance(node, Call) and is_over_run(node))):
+        for child in children(node):
+            expect_number(child, courses, place)
+
+
 def expect_names(node: Node, valid: set[str], place: str) -> None:
     """Raise `UsageError` for the first name of an expression that is not valid, with those nearest to it."""
     for name in names(node):

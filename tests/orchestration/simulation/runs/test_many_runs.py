@@ -186,6 +186,7 @@ WRONG: list[tuple[Any, dict[str, Any], str]] = [
     ),
     ({X: [0.0]}, {"metrics": {"tilt": np.max}}, r"^metrics: tilt = .*: expected an expression as text"),
     ({X: [0.0]}, {"metrics": {"tilt": "max(plant.tlt)"}}, r"plant.tlt"),
+    ({X: [0.0]}, {"metrics": {"tilt": "plant.tilt"}}, r"tilt: plant.tilt has a value at each instant; .* as max\(…\)"),
     ({"plant.mass": [1.0, -1.0]}, {}, r"^plant.mass = -1.0: expected at least 0"),
     ({"timing.period": [0.1, -1.0]}, {}, r"^timing.period = -1.0: expected a positive number$"),
     ({"controller.discretisation": ["mean", "meen"]}, {}, r"controller.discretisation = meen: did you mean mean"),
