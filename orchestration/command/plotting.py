@@ -29,7 +29,8 @@ def plot(
     start: Annotated[float | None, option("--from", "Start of the time axis, in seconds.")] = None,
     end: Annotated[float | None, option("--to", "End of the time axis.")] = None,
     figure: Annotated[
-        list[str] | None, option("--figure", f"One of {', '.join(FIGURES)}; default: all.", "NAME")
+        list[str] | None,
+        option("--figure", f"One of {', '.join(FIGURES)}, or a recorded signal; default: all of these.", "NAME"),
     ] = None,
     out: Annotated[
         Path | None,

@@ -1,6 +1,6 @@
 """The figure of the signals that are exchanged in a system of any FMUs."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,10 +21,24 @@ Panel = tuple[str, str | None, list[str]]
 def signals(runs: Sequence[DrawnRun], style: Style) -> Figure:
     """A panel for each connection and unit, its signals as the receiver has them.
 
-    Without connections, the recorded outputs of each component. Of more than `MAX_PANELS` the first are drawn,
-    and the number of signals of the others is stated.
+    Without connections, the recorded outputs of each component.
     """
-    available = [*_panels(runs[0].system, runs[0].described)]
+    return _in_panels([*_panels(runs[0].system, runs[0].described)], runs, style)
+
+
+def of_name(name: str, runs: Sequence[DrawnRun], style: Style) -> Figure:
+    """The recorded signals of this name, as `columns_of` finds them."""
+    described = runs[0].described
+    return _in_panels([*_by_unit(component_of(name), columns_of(name, described), described)], runs, style)
+
+
+def columns_of(name: str, recorded: Iterable[str]) -> list[str]:
+    """The column of this name, or those of the vector, or part of a component, of this name."""
+    return [column for column in recorded if column == name or column.startswith(f"{name}.")]
+
+
+def _in_panels(available: Sequence[Panel], runs: Sequence[DrawnRun], style: Style) -> Figure:
+    """Of more than `MAX_PANELS` the first are drawn, and the number of signals of the others is stated."""
     contents = available[:MAX_PANELS]
     figure = style.figure(3.0 + 10.5 * max(1, len(contents)))
     panels = figure.subplots(max(1, len(contents)), 1, sharex=True, squeeze=False)[:, 0]
@@ -56,13 +70,17 @@ def _panels(system: System, described: Mapping[str, ColumnInfo]) -> Iterator[Pan
         name: [column for column in described if column.startswith(f"{name}.")] for name in system.components
     }
     for name, columns in (of_connections or of_components).items():
-        by_unit: dict[str | None, list[str]] = {}
-        for column in columns:
-            if column in described:
-                by_unit.setdefault(described[column].unit, []).append(column)
-        for unit, of_unit in by_unit.items():
-            for first in range(0, len(of_unit), MAX_LINES):
-                yield name, unit, of_unit[first : first + MAX_LINES]
+        yield from _by_unit(name, columns, described)
+
+
+def _by_unit(owner: str, columns: Iterable[str], described: Mapping[str, ColumnInfo]) -> Iterator[Panel]:
+    by_unit: dict[str | None, list[str]] = {}
+    for column in columns:
+        if column in described:
+            by_unit.setdefault(described[column].unit, []).append(column)
+    for unit, of_unit in by_unit.items():
+        for first in range(0, len(of_unit), MAX_LINES):
+            yield owner, unit, of_unit[first : first + MAX_LINES]
 
 
 def _draw(panel: Axes, run: DrawnRun, columns: Sequence[str], *, alone: bool) -> None:

@@ -4,12 +4,13 @@ from collections.abc import Collection, Sequence
 
 from matplotlib.figure import Figure
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.recording.recording import thinned
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.gallery import Figures
+from orchestration.simulation.figures.signals import columns_of, of_name
 from orchestration.simulation.figures.style import SCREEN, Style, style_named
-from orchestration.simulation.figures.views import VIEWS, view_of
+from orchestration.simulation.figures.views import VIEWS, View, view_of
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_labels import labels_of_runs
 
@@ -28,7 +29,8 @@ def draw(
     """Figures of a run, or of several runs overlaid, by name; default: all.
 
     `names` label the runs; default: the settings that differ between their scenarios. `window` is the span of time [s]
-    that is shown. A figure that is not available, as the energy of a controller that has none, is left out.
+    that is shown. A figure that is not available, as the energy of a controller that has none, is left out. Beside
+    figures, `which` may have recorded signals: `plant.tilt`, or `plant.acceleration` for its three parts.
 
     Raises `UsageError` for an unknown figure, and for runs of different systems.
     """
@@ -38,15 +40,30 @@ def draw(
     if any(view is not views[0] for view in views) or len(components) != 1:
         raise UsageError("expected runs of one system to lay over each other")
     view = views[0]
-    for name in which or ():
-        if not any(name in each.names for each in VIEWS.values()):
-            raise UsageError(f"--figure {name}: expected one of {', '.join(view.names)}")
+    of_signals = {name: _columns(name, view, listed) for name in which or () if not _is_figure(name)}
     drawing = view.load()
     labels = names or labels_of_runs(listed, [f"run {i + 1}" for i in range(len(listed))])
-    runs = runs_of(listed, labels, drawing.columns(listed[0].system, listed[0].described), window)
+    columns = {*drawing.columns(listed[0].system, listed[0].described)}.union(*of_signals.values())
+    runs = runs_of(listed, labels, columns, window)
     with style.applied():
         figures = {name: drawing.makers[name](runs, style) for name in view.names if which is None or name in which}
+        figures |= {name: of_name(name, runs, style) for name in of_signals}
     return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def _is_figure(name: str) -> bool:
+    return any(name in each.names for each in VIEWS.values())
+
+
+def _columns(name: str, view: View, runs: Sequence[Result]) -> list[str]:
+    """The recorded columns of this name; raises `UsageError` if there are none."""
+    found = columns_of(name, runs[0].recording.columns)
+    if not found:
+        raise UsageError(
+            f"--figure {name}: expected one of {', '.join(view.names)}, or a recorded signal, as plant.position"
+            + did_you_mean(name, runs[0].recording.columns)
+        )
+    return found
 
 
 def figures_of(

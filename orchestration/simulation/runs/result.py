@@ -208,8 +208,9 @@ class Result:
         """Figures of the run; default: all. A notebook shows what is returned.
 
         Of a flight `which` is among path, errors, components, commands, energy, phase and spectrum, of any other system
-        it is signals. Runs `beside` it are overlaid. `window` is the span of time [s] that is shown, `style` sets sizes
-        and fonts, as in `quadcosim plot`. The figures are those of matplotlib, by name.
+        it is signals; or it is a recorded signal, as plant.thrust. Runs `beside` it are overlaid. `window` is the span
+        of time [s] that is shown, `style` sets sizes and fonts, as in `quadcosim plot`. The figures are those of
+        matplotlib, by name.
 
         Raises `UsageError` for an unknown figure, and for runs of different systems.
         """

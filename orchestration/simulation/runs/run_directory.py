@@ -14,6 +14,7 @@ from orchestration.foundation.basics.errors import Named, SimulatorError, UsageE
 from orchestration.foundation.recording import tables
 from orchestration.foundation.recording.tables import ToFolder
 from orchestration.simulation.engines.resolved import columns_of
+from orchestration.simulation.figures.names import FORMATS
 from orchestration.simulation.figures.views import files, view_of
 from orchestration.simulation.requests.request import load_request
 from orchestration.simulation.results.units import ColumnInfo
@@ -184,9 +185,18 @@ def run_folder(folder: Path, replaces: Container[str] = ()) -> AbstractContextMa
     def replaceable(place: Path) -> bool:
         names = {path.name for path in place.iterdir() if path.is_file()}
         others = {path.name for path in place.iterdir()} - _KNOWN - files()
-        return not others and any(name in names and name in replaces for name in kinds)
+        return (not others or others <= _figures_of_signals(place)) and any(
+            name in names and name in replaces for name in kinds
+        )
 
     return new_folder(folder, replaceable, expected)
+
+
+def _figures_of_signals(place: Path) -> set[str]:
+    """The names of files that a figure of a signal, or of the signals below a name, may have there."""
+    described = read_json(place / PROVENANCE, MAX_JSON_LENGTH)["described"] if (place / PROVENANCE).is_file() else ()
+    parts = (column.split(".") for column in described)
+    return {f"{'.'.join(part[:k])}.{ending}" for part in parts for k in range(1, len(part) + 1) for ending in FORMATS}
 
 
 _KNOWN = {

@@ -158,8 +158,18 @@ def test_a_legend_tells_what_differs_between_runs(flight: Result, slow: Result) 
 def test_runs_of_different_systems_are_not_laid_over_each_other(flight: Result, tank: Result) -> None:
     with pytest.raises(UsageError, match="expected runs of one system"):
         draw([flight, tank])
-    with pytest.raises(UsageError, match="figure = beauty: expected one of path, errors"):
+    with pytest.raises(UsageError, match=r"beauty: expected one of path, errors, .*, or a recorded signal"):
         draw(flight, ["beauty"])
+    with pytest.raises(UsageError, match=r"tank.levl: expected .*; did you mean tank.level"):
+        draw(tank, ["tank.levl"])
+
+
+def test_any_recorded_signal_or_vector_is_drawn_by_its_name(flight: Result, slow: Result) -> None:
+    figures = draw([flight, slow], ["controller.attitude_error", "plant.thrust"])
+    assert [*figures] == ["controller.attitude_error", "plant.thrust"]
+    (vector,), (scalar,) = ([*seen(figure)] for figure in figures.values())
+    assert len(vector.get_lines()) == 8
+    assert (len(scalar.get_lines()), " ".join(scalar.get_ylabel().split())) == (2, "plant: thrust [N]")
 
 
 @in_test_all

@@ -174,8 +174,11 @@ def test_no_energy_is_drawn_of_a_controller_that_has_none() -> None:
 
 def test_an_earlier_run_is_replaced_whole(drawn: Path, folder: Path) -> None:
     shutil.copytree(drawn, folder)
+    for name in ("plant.thrust", "plant.position"):
+        (folder / f"{name}.png").touch()
     other = quadcosim.run(native(stop_time=0.1))
     save_run(other, folder, figures=False)
+    assert not [*folder.glob("plant.*")]
     assert load_run(folder).rows.tobytes() == other.rows.tobytes()
     assert not FIGURES & {path.name for path in folder.iterdir()}
     assert list(folder.parent.iterdir()) == [folder]
