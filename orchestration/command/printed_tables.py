@@ -11,6 +11,8 @@ from orchestration.command.options import option
 from orchestration.foundation.basics.errors import UsageError
 
 FORMATS = ("csv", "markdown", "latex")
+MAX_ROWS = 40
+"""Most rows of a table in LaTeX that stands on one page"""
 TABLE = option("--table", "Print the cells with their intervals as a table of that format.", "|".join(FORMATS))
 
 
@@ -44,18 +46,33 @@ def lines(table: PrintedTable, form: str) -> Iterator[str]:
             yield "| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |"
         yield ""
         yield table.caption
-    else:
+    elif len(table.rows) <= MAX_ROWS:
         yield r"\begin{table}  % needs \usepackage{booktabs}"
         yield r"\centering"
         yield rf"\caption{{{_latex(table.caption)}}}"
         yield r"\begin{tabular}{" + "l" * len(table.heads) + "}"
-        yield r"\toprule"
-        yield _latex_row(table.heads)
-        yield r"\midrule"
+        yield from _latex_head(table)
         yield from map(_latex_row, table.rows)
         yield r"\bottomrule"
         yield r"\end{tabular}"
         yield r"\end{table}"
+    else:
+        yield r"\begin{longtable}{" + "l" * len(table.heads) + r"}  % needs \usepackage{booktabs,longtable}"
+        yield rf"\caption{{{_latex(table.caption)}}} \\"
+        yield from _latex_head(table)
+        yield r"\endfirsthead"
+        yield from _latex_head(table)
+        yield r"\endhead"
+        yield r"\bottomrule"
+        yield r"\endfoot"
+        yield from map(_latex_row, table.rows)
+        yield r"\end{longtable}"
+
+
+def _latex_head(table: PrintedTable) -> Iterator[str]:
+    yield r"\toprule"
+    yield _latex_row(table.heads)
+    yield r"\midrule"
 
 
 _OF_TEX: Mapping[int, str] = {ord(character): f"\\{character}" for character in "&%$#_{}"} | {

@@ -59,6 +59,11 @@ def test_events_become_a_table_in_seconds(result: Result) -> None:
     ]
 
 
+def test_a_table_of_another_name_is_refused_with_those_that_there_are(result: Result) -> None:
+    with pytest.raises(UsageError, match=r"what = 'event': did you mean events\? expected one of signals, events"):
+        result.to_pandas("event")  # type: ignore[arg-type]
+
+
 def test_without_pandas_one_line_names_the_extra(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(

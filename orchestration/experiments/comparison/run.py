@@ -17,7 +17,7 @@ from orchestration.experiments.studies.study_file import FileLike
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.experiments.studies.swept import Swept
 from orchestration.experiments.studies.table import export, frame, units_in
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, expect_one_of
 from orchestration.foundation.basics.extras import explains_missing, needs
 from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.progress import CountProgress
@@ -122,9 +122,13 @@ class Compared:
 
     @explains_missing
     def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
-        """A row for each cell: counts of runs that survive and settle, medians; or the limits, or the runs."""
+        """A row for each cell: counts of runs that survive and settle, medians; or the limits, or the runs.
+
+        Raises `UsageError` for another name.
+        """
         import pandas as pd
 
+        expect_one_of("what", what, ("cells", "limits", "runs"))
         if what == "runs":
             return self.table
         listed = self.outcome.limits if what == "limits" else self.outcome.cells

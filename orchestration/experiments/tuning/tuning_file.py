@@ -12,6 +12,8 @@ from orchestration.experiments.tuning.tuning_problem import SearchResult, Tuning
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import table_of
+from orchestration.simulation.workers.provenance import versions
+from orchestration.systems.system.description import describe_clock, describe_faults
 from orchestration.systems.system.model import System
 from orchestration.systems.system.starts import Starts
 
@@ -94,10 +96,14 @@ def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[
 
     others = [one for one in all_results if one.period == best.period]
     of, *more = tuning.describe_cost()
+    system, known = tuning.system(best.period, best.values), versions()
+    faults = [f"{x.name} {text}" for x in system.connections if (text := describe_faults(x))] or ["no faults"]
+    software = f"quadcosim {known['quadcosim']}, sources {known['sources'][:16]}, numpy {known['numpy']}"
     lines = [
         f"Tuned for a period of {best.period:g} s by: {command}",
         f"{best.evaluations} evaluations of {of}",
         *more,
+        f"The loop is {'; '.join([describe_clock(system), *faults])}. By {software}.",
         f"Of {len(others)} searches that of seed {best.seed} is taken: it costs least on these, {best.cost:.5g}.",
         *(f"Seed {one.seed}: {one.judgement}." for one in others),
     ]

@@ -86,6 +86,12 @@ def expected_name(name: str, known: Sequence[str]) -> str:
     return f"{did_you_mean(name, known)} expected one of {', '.join(known)}".lstrip("; ")
 
 
+def expect_one_of(argument: str, name: str, known: Sequence[str]) -> None:
+    """Raise `UsageError` for a value of an argument that is none of the known names."""
+    if name not in known:
+        raise UsageError(f"{argument} = {name!r}: {expected_name(str(name), known)}")
+
+
 def listed(names: Iterable[str], most: int = 12) -> str:
     """Names for a message: the first `most` of them, and how many more there are."""
     known = list(names)

@@ -1,5 +1,6 @@
 """The results of many runs as arrays by name, and as the tables of pandas and xarray."""
 
+import importlib.util
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -56,6 +57,14 @@ class Flights(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         return f"<Flights: {np.prod(self.shape, dtype=int)} runs by {self.engine}; {', '.join(self.arrays)}>"
+
+    def _repr_html_(self) -> str:
+        """The form that notebooks show: how the runs have ended, and the table of pandas if it is installed."""
+        from orchestration.simulation.results import html
+
+        has_pandas = importlib.util.find_spec("pandas") is not None
+        facts = f"{self.verdict}; shape {self.shape}, by {self.engine}"
+        return html.card("Runs", None, None, facts, ()) + (self.to_pandas().to_html(max_rows=10) if has_pandas else "")
 
     @explains_missing
     def to_pandas(self) -> "pd.DataFrame":

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.foundation.basics.errors import Named
+from orchestration.foundation.basics.errors import Named, expect_one_of
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.simulator import Floats
@@ -222,10 +222,11 @@ class Result:
     def to_pandas(self, what: Literal["signals", "events"] = "signals") -> "pd.DataFrame":
         """The signals as a table indexed by `time` [s], or the events; units are in its `attrs["units"]`, by column.
 
-        Raises `QuadcosimError` where pandas is not installed.
+        Raises `QuadcosimError` where pandas is not installed, `UsageError` for another name.
         """
         from orchestration.foundation.recording import frames
 
+        expect_one_of("what", what, ("signals", "events"))
         return frames.events(self.recording) if what == "events" else frames.signals(self.recording, self.about)
 
     def to_csv(self, folder: str | Path) -> list[Path]:

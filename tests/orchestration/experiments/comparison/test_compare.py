@@ -14,7 +14,7 @@ from orchestration.experiments.comparison.run import agree
 from orchestration.quadrotor.flight.bandwidth import crossover
 from orchestration.quadrotor.flight.hover import COORDINATES, hover_of
 from orchestration.quadrotor.flight.hover_loop import controller_at_hover, located
-from quadcosim import FmuChoice, Scenario
+from quadcosim import FmuChoice, Scenario, UsageError
 from tests.commands import Main
 
 FILE = """
@@ -119,6 +119,8 @@ def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
     found = quadcosim.compare(native, folder=folder / "out", figures=False, progress=None, announce=None)
     assert found.summary.flown == 0
     assert found.verdict.startswith("from half of the starts, over period: coupled survives ")
+    with pytest.raises(UsageError, match=r"what = 'pairs': .*expected one of cells, limits, runs"):
+        found.to_pandas("pairs")  # type: ignore[arg-type]
     assert {*found.plot(style="paper")} == {path.stem for path in (folder / "out").glob("*.png")}
 
 

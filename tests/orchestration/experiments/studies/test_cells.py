@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 
-from orchestration.command.printed_tables import PrintedTable, lines
+from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, lines
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
@@ -228,6 +228,16 @@ def test_a_printed_table_has_nothing_that_tex_reads_otherwise() -> None:
     assert r"law\_a \& b & share \\" in text
     assert r"\#1 & $-$0.4 [$-$1, 2] \\" in text
     assert [*lines(table, "markdown")][-2:] == ["", "50 % of law_a"]
+
+
+def test_a_table_of_more_rows_than_a_page_has_is_continued_on_further_pages() -> None:
+    rows = [[str(number), "1.00"] for number in range(MAX_ROWS + 1)]
+    table = PrintedTable(caption="Many", heads=["run", "share"], rows=rows, numbers=[])
+    text = [*lines(table, "latex")]
+    assert text[0] == r"\begin{longtable}{ll}  % needs \usepackage{booktabs,longtable}"
+    assert text[1] == r"\caption{Many} \\"
+    assert text.count(r"run & share \\") == 2, "a head for the first page and one for the others"
+    assert text[-2:] == [rf"{MAX_ROWS} & 1.00 \\", r"\end{longtable}"]
 
 
 def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:

@@ -189,6 +189,7 @@ def test_an_interrupted_tuning_continues(tuning, tmp_path):
     comments = written[0].read_text()
     assert re.search(r"# Of 2 searches that of seed [12] is taken", comments)
     assert comments.count("other starts survive (a share of ") == 2
+    assert re.search(r"# The loop is sampled every 10 ms; .*\. By quadcosim \S+, sources [0-9a-f]{16}, numpy", comments)
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,9 @@ def test_arrays_of_any_shape_broadcast_and_become_the_axes_of_a_dataset() -> Non
     assert table["timing.period"].tolist() == [0.01] * 3 + [0.02] * 3
     assert table["tilt_max"].tolist() == found["tilt_max"].reshape(-1).tolist()
     assert table.attrs["units"]["tilt_max"] == "rad"
+    shown = found._repr_html_()
+    assert found.verdict in shown
+    assert "<th>tilt_max</th>" in shown
 
 
 @needs_compiler
