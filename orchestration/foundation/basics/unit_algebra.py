@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TypeAlias
 
-from fmu_kit.units import BASE, factors
+from fmu_kit.units import BASE, SYMBOLS, factors
 from orchestration.foundation.basics.errors import UsageError
 
 
@@ -173,9 +173,18 @@ def first(word: str, operands: Sequence[Operand]) -> Unit | None:
 
 
 def over_time(word: str, operands: Sequence[Operand]) -> Unit | None:
-    """The unit of an integral over time."""
+    """The unit of an integral over time: J of W, C of A."""
     unit = operands[0].unit
-    return None if unit is None else unit.times(SECOND)
+    return None if unit is None else _renamed(unit.times(SECOND))
+
+
+def _renamed(unit: Unit) -> Unit:
+    """A symbol times a second under the one symbol that SI has for it, if it has."""
+    is_product = len(unit.symbols) == 2 and all(exponent == 1 for _, exponent in unit.symbols)
+    if not is_product or unit.base is None or unit.base.factor != 1.0:
+        return unit
+    exponents = {name: int(e) for name, e in zip(BASE, unit.base.exponents) if e}
+    return next((replace(unit, symbols=((name, Fraction(1)),)) for name, e in SYMBOLS.items() if e == exponents), unit)
 
 
 def product(word: str, operands: Sequence[Operand]) -> Unit | None:
