@@ -18,7 +18,7 @@ from orchestration.simulation.figures.style import Style
 from orchestration.systems.computers import results
 from orchestration.systems.schedule.resources import timeline_of
 
-PIECES = 160
+PIECES = 60
 """Pieces of the busiest processor or link, as many as can be told apart"""
 BAR, LATE = 0.62, 0.16
 """Heights in a row of bars for running and for waiting"""
