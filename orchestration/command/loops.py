@@ -43,7 +43,7 @@ def bode(
                 loop.output,
                 ", ".join(f"{one.factor:.4g}" for one in loop.gain_margins) or "infinite",
                 "infinite" if phase is None else f"{phase:.4g}°",
-                "infinite" if delay is None else quantity(delay, "s"),
+                "not known" if loop.delay_reason else "infinite" if delay is None else quantity(delay, "s"),
                 "-" if crossover is None else f"{crossover:.4g} rad/s",
                 f"{loop.sensitivity_peak:.4g}",
             )
@@ -55,6 +55,7 @@ def bode(
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
     }
     lines = list(in_columns(rows, right=True)) if found.loops else []
+    lines += [f"delay margin of {loop.output}: {loop.delay_reason}" for loop in found.loops if loop.delay_reason]
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 

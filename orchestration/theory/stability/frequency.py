@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import cache
 from itertools import islice
 from typing import TYPE_CHECKING, Literal
 
@@ -20,13 +21,9 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.theory.stability.delay_margin import Crossover, Late, crossover_at, delay_margin
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.lifted_margins import (
-    delay_margin,
-    gain_margins,
-    lifted_gains,
-    phase_margin,
-)
+from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.linearise import (
     NEAR_ONE,
     Linearised,
@@ -37,10 +34,11 @@ from orchestration.theory.stability.linearise import (
     sampled_component,
     stability_of,
 )
-from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
-from orchestration.theory.stability.loop_halves import closed, radius, response
+from orchestration.theory.stability.loop_at_rest import whole_at_rest
+from orchestration.theory.stability.loop_halves import closed, loop_gains, radius
 from orchestration.theory.stability.operating_point import deterministic
 from orchestration.theory.stability.poles import Complexes
+from orchestration.theory.stability.sign_changes import root, sign_changes
 from orchestration.theory.stability.state_space import StateSpace
 
 if TYPE_CHECKING:
@@ -55,14 +53,8 @@ BESIDE_A_POLE = np.linspace(-4.0, 4.0, 17)
 """Further frequencies about that of a pole, in units of its damping"""
 BESIDE_A_TURN = 1e-4
 """Least distance of a frequency from whole turns in a period of several samples"""
-HALVINGS = 60
 PROVED = 1e-3
 """Relative distance from a gain margin at which the loop is stable on one side and unstable on the other"""
-EXACT = 1e-6
-"""Change of a delay margin, in periods, at which its iteration ends"""
-ITERATIONS = 20
-BEYOND = 1.5
-"""Factor on the least delay margin beyond which an estimate at another crossover cannot be less"""
 
 
 @passable
@@ -92,7 +84,9 @@ class LoopMargins:
     phase_margin: float | None
     """The smallest distance of the phase from that of -1 where the gain is 1 [deg]; None: it is nowhere 1."""
     delay_margin: float | None
-    """The further delay of the command at which the loop becomes unstable [s]; None: infinite."""
+    """The further delay of the command at which the loop becomes unstable [s]; None: infinite, or not known."""
+    delay_reason: str = ""
+    """Why the delay margin is not known; empty: it is."""
     crossover: float | None
     """The frequency of the phase margin [rad/s]; None: the gain is nowhere 1."""
     sensitivity_peak: float
@@ -135,7 +129,11 @@ class Bode:
         margins = [
             f"gain margin{'s' * (len(gains) - 1)} {' and '.join(gains)}" if gains else "infinite gain margin",
             f"phase margin {min(phases, key=abs):.3g}°" if phases else "infinite phase margin",
-            f"delay margin {quantity(min(delays), 's')}" if delays else "infinite delay margin",
+            "delay margin not known"
+            if any(loop.delay_reason for loop in self.loops)
+            else f"delay margin {quantity(min(delays), 's')}"
+            if delays
+            else "infinite delay margin",
         ]
         return f"stable, {clock}: {', '.join(margins)} (small deviations)"
 
@@ -184,25 +182,24 @@ def _bode(request: Request, component: str | None) -> Bode:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = deterministic(rested(request))
         name = sampled_component(system, component)
-        known: KnownTangents = {}
         models = files_of(system).models_of(system)
-        with whole_at_rest(system, instances, models=models, known=known) as rest:
+        with whole_at_rest(system, instances, models=models) as rest:
             loop = cut_open(rest, name)
 
-        def late(delay: float) -> StateSpace:
-            with whole_at_rest(delayed(system, name, delay), instances, models=models, known=known) as rest:
-                return rest_of_loop(rest, name)
+            @cache
+            def late(delay: float) -> StateSpace:
+                return rest_of_loop(rest, name, delayed(rest.simulation.system, name, delay).connections)
 
-        expect_decided(loop)
-        frequencies, stable = _frequencies(loop), loop.radius < 1.0
-        if loop.samples == 1:
-            gains = loop_gains(loop, frequencies)
-            each = (_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop))
-        else:
-            curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
-            gains = np.array([curve for curve, _ in curves])
-            each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
-        found = tuple(each) if stable else ()
+            expect_decided(loop)
+            frequencies, stable = _frequencies(loop), loop.radius < 1.0
+            if loop.samples == 1:
+                gains = loop_gains(loop, frequencies)
+                each = (_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop))
+            else:
+                curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
+                gains = np.array([curve for curve, _ in curves])
+                each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
+            found = tuple(each) if stable else ()
     return Bode(
         dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=found,
         frequencies=frequencies, gains=gains,
@@ -229,7 +226,7 @@ def _commands(loop: Linearised) -> range:
 
 
 def _lifted_margins(
-    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, peak: float, late: Callable[[float], StateSpace],
+    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, peak: float, late: Late,
     system: System,
 ) -> LoopMargins:  # fmt: skip
     """The margins of a command at all of its samples in a period."""
@@ -237,42 +234,52 @@ def _lifted_margins(
     turn, crossover = phase_margin(loop, i) or (None, None)
     factors = tuple(GainMargin(factor=factor, frequency=at) for factor, at in gain_margins(loop, i))
     crossings = np.flatnonzero(np.diff(np.sign(np.abs(gain) - 1.0)))
-    estimates = [_turn(complex(gain[place])) / float(frequencies[place]) for place in crossings]
+    crossovers = [crossover_at(float(frequencies[place]), complex(gain[place])) for place in crossings]
     if turn is not None and crossover:
-        estimates.append(turn % (2.0 * math.pi) / crossover)
+        crossovers.append((crossover, turn % (2.0 * math.pi) / crossover))
+    delay, why = _delay_margin(loop, i, crossovers, late)
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
         gain_margin=min((one.factor for one in factors), key=_away_from_one, default=None),
         gain_margins=factors,
         phase_margin=None if turn is None else math.degrees(turn),
-        delay_margin=delay_margin(loop, i, min(estimates), late) if estimates else None,
+        delay_margin=delay,
+        delay_reason=why,
         crossover=crossover,
         sensitivity_peak=peak,
     )
 
 
-def _margins(
-    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, late: Callable[[float], StateSpace], system: System
-) -> LoopMargins:
+def _margins(loop: Linearised, i: int, frequencies: Floats, gain: Complexes, late: Late, system: System) -> LoopMargins:
     def gain_at(frequency: float) -> complex:
         return complex(loop_gains(loop, np.array([frequency]))[i, 0])
 
     output = f"{loop.name}.{loop.component.outputs[i]}"
     gain_margins = tuple(_gain_margins(loop, i, frequencies, gain, gain_at))
-    crossings = [_root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in _changes(frequencies, np.abs(gain) - 1.0)]
+    crossings = [root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in sign_changes(frequencies, np.abs(gain) - 1.0)]
     phases = {w: _phase_margin(gain_at(w)) for w in crossings}
     crossover = min(phases, key=lambda w: abs(phases[w]), default=None)
+    delay, why = _delay_margin(loop, i, [crossover_at(w, gain_at(w)) for w in crossings], late)
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
         gain_margin=min((one.factor for one in gain_margins), key=_away_from_one, default=None),
         gain_margins=gain_margins,
         phase_margin=None if crossover is None else math.degrees(phases[crossover]),
-        delay_margin=_delay_margin(loop, i, crossings, gain_at, late),
+        delay_margin=delay,
+        delay_reason=why,
         crossover=crossover,
         sensitivity_peak=float(np.abs(1.0 / (1.0 + gain)).max()),
     )
+
+
+def _delay_margin(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> tuple[float | None, str]:
+    """The delay margin, and why it is not known."""
+    try:
+        return delay_margin(loop, i, crossovers, late), ""
+    except UsageError as error:
+        return None, str(error)
 
 
 def _phase_margin(gain: complex) -> float:
@@ -285,7 +292,7 @@ def _gain_margins(
 ) -> Iterator[GainMargin]:
     """The factors nearest to 1, below and above, beyond which the loop is unstable, as its eigenvalues confirm."""
     ends = [w for w in (0.0, math.pi / loop.rest.dt) if _is_finite_at(loop, w)]
-    inner = [_root(lambda w: gain_at(w).imag, *pair) for pair in _changes(frequencies, gain.imag)]
+    inner = [root(lambda w: gain_at(w).imag, *pair) for pair in sign_changes(frequencies, gain.imag)]
     found = [GainMargin(factor=-1.0 / gain_at(w).real, frequency=w) for w in [*ends, *inner] if gain_at(w).real < 0.0]
     nearest = sorted(found, key=lambda one: _away_from_one(one.factor))
     for side in (-1.0, 1.0):
@@ -301,74 +308,6 @@ def _ends_stability(loop: Linearised, i: int, factor: float) -> bool:
 
 def _away_from_one(factor: float) -> float:
     return abs(math.log(factor))
-
-
-def _delay_margin(
-    loop: Linearised,
-    i: int,
-    crossings: Sequence[float],
-    gain_at: Callable[[float], complex],
-    late: Callable[[float], StateSpace],
-) -> float | None:
-    """The further delay of a command at which the loop becomes unstable [s].
-
-    Of whole periods n the loop gain has the factor z^-n; by the part of a period that remains the hold is shifted,
-    so that the loop is linearised with it: to a fixed point.
-    """
-    dt = loop.rest.dt
-    least: float | None = None
-    for estimate, crossing in sorted((_turn(gain_at(crossing)) / crossing, crossing) for crossing in crossings):
-        if least is not None and estimate > BEYOND * least:
-            break
-        delay, at = estimate, crossing
-        for _ in range(ITERATIONS):
-            whole = math.floor(delay / dt)
-            rest = late(delay - whole * dt)
-
-            def gain_late(w: float, rest: StateSpace = rest) -> complex:
-                return complex(loop_gains(loop, np.array([w]), i, rest)[i, 0])
-
-            near = np.linspace(0.8 * at, min(1.25 * at, math.pi / dt), 61)
-            sizes = np.abs(loop_gains(loop, near, i, rest)[i]) - 1.0
-            ends = min(_changes(near, sizes), key=lambda pair: abs(sum(pair) / 2.0 - at), default=None)
-            if ends is None:
-                break
-            at = _root(lambda w: abs(gain_late(w)) - 1.0, *ends)
-            left = _phase_margin(gain_late(at) * np.exp(-1j * at * dt * whole)) / at
-            delay += left
-            if abs(left) < EXACT * dt:
-                least = delay if least is None else min(least, delay)
-                break
-        else:
-            raise UsageError(f"{loop.component.outputs[i]}: its delay margin near {delay:.4g} s cannot be computed")
-    return least
-
-
-def _turn(gain: complex) -> float:
-    """The angle from -1 up to a gain, in a turn [rad]."""
-    return float(np.angle(-gain)) % (2.0 * math.pi)
-
-
-def loop_gains(
-    loop: Linearised, frequencies: Floats, only: int | None = None, late: StateSpace | None = None
-) -> Complexes:
-    """The gain of the loop of each command with the others closed, shape (commands, n).
-
-    The command `only` reaches the rest of the loop as it reaches `late`.
-    """
-    z = np.exp(1j * frequencies * loop.rest.dt)
-    rest, law = response(loop.rest, z), response(loop.component, z)
-    if late is not None:
-        rest[:, :, only] = response(late, z)[:, :, only]
-    back = -law @ rest
-    count = back.shape[1]
-    gains = np.empty((count, len(z)), dtype=complex)
-    for i in range(count):
-        others = [j for j in range(count) if j != i]
-        closed = np.eye(len(others)) + back[:, others][:, :, others]
-        through = np.linalg.solve(closed, back[:, others][:, :, [i]])
-        gains[i] = (back[:, [i], i] - (back[:, [i]][:, :, others] @ through)[:, :, 0])[:, 0]
-    return gains
 
 
 def radius_with(loop: Linearised, i: int, factor: float) -> float:
@@ -407,18 +346,3 @@ def _rates(A: Floats, dt: float) -> Complexes:
     poles = np.linalg.eigvals(A).astype(complex)
     rates: Complexes = np.log(poles[np.abs(poles) > LOWEST]) / dt
     return rates
-
-
-def _changes(frequencies: Floats, values: Floats) -> list[tuple[float, float]]:
-    """Neighbouring frequencies between which a value changes its sign."""
-    signs = np.sign(values)
-    places = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
-    return [(float(frequencies[place]), float(frequencies[place + 1])) for place in places]
-
-
-def _root(of: Callable[[float], float], low: float, high: float) -> float:
-    rising = of(high) > of(low)
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if (of(middle) > 0.0) == rising else (middle, high)
-    return 0.5 * (low + high)

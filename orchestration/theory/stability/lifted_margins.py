@@ -10,22 +10,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.theory.stability.linearise import NEAR_ONE, Linearised
-from orchestration.theory.stability.loop_halves import closed, radius, response, with_rest
+from orchestration.theory.stability.loop_halves import closed, radius, response
 from orchestration.theory.stability.poles import Complexes
-from orchestration.theory.stability.root_locus import zero_between
-from orchestration.theory.stability.state_space import StateSpace, reduced
 
 FACTORS = np.geomspace(1.0, 1e4, 401)[1:]
 """Factors on a command that are tried, and their inverses"""
 TURNS = np.linspace(0.0, math.pi, 361)[1:]
 """Turns of the phase of a command that are tried [rad]"""
-FARTHEST = 3.0
-"""Longest delay of a command that is tried, in first estimates"""
-WHOLE = 1e-6
-"""Part of a sample that counts as none"""
 HALVINGS = 50
 
 
@@ -83,55 +76,9 @@ def phase_margin(loop: Linearised, i: int) -> tuple[float, float] | None:
     return None
 
 
-def delay_margin(loop: Linearised, i: int, estimate: float, late: Callable[[float], StateSpace]) -> float:
-    """The least further delay of a command at which the loop becomes unstable [s].
-
-    `late` is the rest of the loop with such a delay; it is asked for parts of a sample. Raises `UsageError` where the
-    loop is stable beyond three times the `estimate` [s].
-    """
-
-    def beyond(delay: float) -> float:
-        whole = math.floor(delay / loop.dt + WHOLE)
-        part = max(0.0, round(delay - whole * loop.dt, 9))
-        part_late = loop if part == 0.0 else _with(loop, i, late(part))
-        return radius(_with_samples(part_late, i, whole)) - 1.0
-
-    before = (0.0, loop.radius - 1.0)
-    for sample in range(1, math.ceil(FARTHEST * estimate / loop.dt) + 2):
-        now = sample * loop.dt, beyond(sample * loop.dt)
-        if now[1] > 0.0:
-            return zero_between(beyond, lambda value: round(value, 9), before, now)
-        before = now
-    raise UsageError(f"{loop.component.outputs[i]}: its delay margin near {estimate:.4g} s cannot be computed")
-
-
 def radius_with(loop: Linearised, i: int, factor: complex) -> float:
     """The spectral radius with a factor on all samples of a command."""
     return radius(loop, _factors(loop, i, factor))
-
-
-def _with(loop: Linearised, i: int, late: StateSpace) -> Linearised:
-    """The loop in which a command reaches the rest as it reaches `late`."""
-    own, rest = places(loop, i), loop.rest
-    count = len(rest.A)
-    others = np.setdiff1d(np.arange(rest.B.shape[1]), own)
-    A = np.block([[rest.A, np.zeros((count, len(late.A)))], [np.zeros((len(late.A), count)), late.A]])
-    B, D = np.zeros((len(A), rest.B.shape[1])), rest.D.copy()
-    B[:count, others], B[count:, own], D[:, own] = rest.B[:, others], late.B[:, own], late.D[:, own]
-    return with_rest(loop, *reduced(A, B, np.hstack([rest.C, late.C])), D)
-
-
-def _with_samples(loop: Linearised, i: int, late: int) -> Linearised:
-    """The loop in which a command is late by whole samples: its last ones are further states."""
-    own, rest, samples = places(loop, i), loop.rest, loop.samples
-    given = np.eye(late + samples)  # the last ones before the period, and those of it
-    sent, kept = given[:samples], given[samples:]
-    B, D = rest.B.copy(), rest.D.copy()
-    B[:, own], D[:, own] = rest.B[:, own] @ sent[:, late:], rest.D[:, own] @ sent[:, late:]
-    further = np.zeros((late, B.shape[1]))
-    further[:, own] = kept[:, late:]
-    A = np.block([[rest.A, rest.B[:, own] @ sent[:, :late]], [np.zeros((late, len(rest.A))), kept[:, :late]]])
-    return with_rest(loop, A, np.vstack([B, further]), np.hstack([rest.C, rest.D[:, own] @ sent[:, :late]]), D)
 
 
 def _factors(loop: Linearised, i: int, factor: complex) -> Complexes:

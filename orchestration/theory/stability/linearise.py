@@ -1,7 +1,7 @@
 """A system about its operating point, cut open at one component: that component, and the rest of the loop."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import TypeVar
@@ -17,6 +17,7 @@ from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
 from orchestration.simulation.workers.choice import single_run_execution
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
@@ -134,11 +135,11 @@ def cut_open(loop: AtRest, name: str) -> Linearised:
     )
 
 
-def rest_of_loop(loop: AtRest, name: str) -> StateSpace:
-    """The rest of a loop at rest, as a sampled component sees it."""
+def rest_of_loop(loop: AtRest, name: str, connections: Sequence[Connection] | None = None) -> StateSpace:
+    """The rest of a loop at rest, as a sampled component sees it, by other `connections` if any."""
     tangent, samples = loop.tangents[name], samples_of(loop, name)
     port, dt = OpenPort(tangent.inputs, tangent.outputs, samples), float(loop.period) / NANOSECONDS
-    whole = period_map(loop, {name: port})
+    whole = period_map(loop, {name: port}, connections)
     size = len(whole) - len(port.received)
     A, B, C = reduced(whole[:size, :size], whole[:size, size:], whole[size:, :size])
     return StateSpace(

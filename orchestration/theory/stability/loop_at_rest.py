@@ -73,8 +73,6 @@ class AtRest:
     extra: ExtraSignals
     saved_states: Mapping[str, bytes]
     """Saved states of the components at rest"""
-    begin: Fraction
-    """Begin of a period: a sample of the component that begins last [ns]"""
     period: Fraction
     """the hyperperiod [ns]"""
     known: KnownTangents
@@ -168,8 +166,7 @@ def _settled(
     known: KnownTangents,
 ) -> Iterator[AtRest]:
     """A system that has come to rest over some periods."""
-    delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
-    begin = latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
+    begin = begin_of(calm, period)
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
     resolved = None if models is None else resolve_with_models(calm, models)
     with prepared(calm, load=tracing_loader(instances), resolved=resolved) as simulation:
@@ -178,8 +175,17 @@ def _settled(
         _settle(simulation, begin, period)
         yield AtRest(
             simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
-            factor=factor, extra=extra, begin=begin, period=period, known=known,
+            factor=factor, extra=extra, period=period, known=known,
         )  # fmt: skip
+
+
+def begin_of(calm: System, period: Fraction) -> Fraction:
+    """Begin of a period in which as many messages are in transit as ever after [ns].
+
+    It is a sample of the component that begins last.
+    """
+    delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
+    return latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
 
 
 def _cycles(system: System, tangents: Mapping[str, AnyTangent]) -> Iterator[Fraction]:

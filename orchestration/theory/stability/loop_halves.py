@@ -53,3 +53,25 @@ def response(of: StateSpace, z: Complexes) -> Complexes:
         return np.tile(of.D.astype(complex), (len(z), 1, 1))
     states = np.linalg.solve(z[:, None, None] * np.eye(len(of.A)) - of.A, of.B.astype(complex)[None])
     return np.asarray(of.C @ states + of.D, dtype=complex)
+
+
+def loop_gains(
+    loop: Linearised, frequencies: Floats, only: int | None = None, late: StateSpace | None = None
+) -> Complexes:
+    """The gain of the loop of each command with the others closed, shape (commands, n).
+
+    The command `only` reaches the rest of the loop as it reaches `late`.
+    """
+    z = np.exp(1j * frequencies * loop.rest.dt)
+    rest, law = response(loop.rest, z), response(loop.component, z)
+    if late is not None:
+        rest[:, :, only] = response(late, z)[:, :, only]
+    back = -law @ rest
+    count = back.shape[1]
+    gains = np.empty((count, len(z)), dtype=complex)
+    for i in range(count):
+        others = [j for j in range(count) if j != i]
+        closed = np.eye(len(others)) + back[:, others][:, :, others]
+        through = np.linalg.solve(closed, back[:, others][:, :, [i]])
+        gains[i] = (back[:, [i], i] - (back[:, [i]][:, :, others] @ through)[:, :, 0])[:, 0]
+    return gains

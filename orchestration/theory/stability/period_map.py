@@ -23,24 +23,32 @@ from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.linear_simulator import LinearSimulator, OpenPort
-from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, whole_at_rest
+from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, begin_of, whole_at_rest
 
 MAX_STATES = 1000
 """states of a loop"""
 
 
-def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Floats:
+def period_map(
+    loop: AtRest, ports: Mapping[str, OpenPort] | None = None, connections: Sequence[Connection] | None = None
+) -> Floats:
     """The derivatives of the state of a loop after a period and, below, of the values received by open `ports` in it.
 
-    By the state before, at the instants of `begin` plus whole periods, and to the right by the values the ports send.
+    By the state before, at the begin of a period, and to the right by the values the ports send. Other `connections`
+    than those of the loop at rest may carry the signals, as later ones.
     """
     ports = ports or {}
     simulators = {**loop.tangents, **ports}
-    master = _master(loop, simulators)
+    system = loop.simulation.system
+    if connections is not None:
+        system = replace(system, connections=tuple(connections))
+    begin = begin_of(system, loop.period)
+    master = _master(loop, system, begin, simulators)
     master.initialise()
-    master.run(pause_at=round(loop.begin))
+    master.run(pause_at=round(begin))
     for one in simulators.values():
         one.sample = 0
     places = [*_state_parts(master, simulators), *(port.sent for port in ports.values())]
@@ -51,7 +59,7 @@ def period_map(loop: AtRest, ports: Mapping[str, OpenPort] | None = None) -> Flo
     result: Floats = np.zeros((rows, columns))
     for i, unit in enumerate(np.eye(columns)):
         _assign(unit, [*_state_parts(master, simulators), *(port.sent for port in ports.values())])
-        master.run(pause_at=round(loop.begin + (i + 1) * loop.period))
+        master.run(pause_at=round(begin + (i + 1) * loop.period))
         after = np.concatenate([*_state_parts(master, simulators), *received])
         if len(after) != rows:
             raise UsageError("the number of messages in transit changes over a period")
@@ -74,19 +82,19 @@ def growth_of_loop(
         return math.log(radius) / (float(loop.period) / NANOSECONDS) if radius > 0.0 else -math.inf
 
 
-def _master(loop: AtRest, simulators: Mapping[str, LinearSimulator]) -> Master:
+def _master(loop: AtRest, system: System, begin: Fraction, simulators: Mapping[str, LinearSimulator]) -> Master:
     """A master of linear simulators, under the clock of the system, for a period for each possible state."""
     simulation = loop.simulation
     system = replace(
-        simulation.system,
-        stop_time=float(loop.begin + (MAX_STATES + 2) * loop.period) / NANOSECONDS,
+        system,
+        stop_time=float(begin + (MAX_STATES + 2) * loop.period) / NANOSECONDS,
         components={
             name: _with_even_steps(component, loop.period)
             if simulation.instances[name].model.varies_step
             else component
-            for name, component in simulation.system.components.items()
+            for name, component in system.components.items()
         },
-        connections=tuple(replace(x, offset=0.0) for x in simulation.system.connections),
+        connections=tuple(replace(x, offset=0.0) for x in system.connections),
         sources={},
         criterion=Criterion(),
     )

@@ -1,7 +1,6 @@
 """The poles of a sampled loop over a quantity, and where they cross the unit circle."""
 
 import math
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
@@ -27,6 +26,7 @@ from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Complexes, poles_of
+from orchestration.theory.stability.sign_changes import zero_between
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.gallery import Figures
@@ -36,23 +36,19 @@ COUNT = 40
 MAX_COUNT = 10_000
 DIGITS = 6
 """Digits of its values in a sentence"""
-ON_CIRCLE = 1e-7
-"""Distance of a spectral radius from 1 at which a crossing is found"""
-TRIALS = 40
-"""Most values that are tried for a crossing"""
 
 
 @passable
 @dataclass(frozen=True, kw_only=True)
 class Crossing:
-    """A value at which poles cross the unit circle."""
+    """A value at which poles cross the unit circle, or beyond which they have jumped across it."""
 
     value: float
-    """Its value, in the unit of the quantity."""
+    """Its value, in the unit of the quantity: where they jump, the last one at which the loop is stable."""
     leaves: bool
     """Whether the loop is unstable above it; else below."""
     real: float
-    """The real part of the pole on the circle."""
+    """The real part of the pole on the circle, or of the one that has jumped out of it."""
     imaginary: float
     """Its imaginary part, of a pair that of the upper one."""
     frequency: float
@@ -158,13 +154,13 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 report(1.0 - place / len(values))
                 if len(radii) < 2 or (radii[0] < 1.0) == (radii[1] < 1.0):
                     continue
-                at = zero_between(
+                inside, outside = zero_between(
                     lambda value: radius(value) - 1.0,
                     lambda value: _short(value, unit),
                     (values[place], radii[0] - 1.0),
                     (values[place + 1], radii[1] - 1.0),
                 )
-                crossings.insert(0, _crossing(at, *found[at], leaves=radii[0] < 1.0))
+                crossings.insert(0, _crossing(inside, *found[outside], leaves=radii[0] < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
     for row, known_poles in zip(poles, each, strict=True):
@@ -182,22 +178,6 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
 def _short(value: float, unit: str | None) -> float:
     """A value with few digits; a time in whole nanoseconds."""
     return round(value, 9) if unit == "s" else float(f"{value:.9g}")
-
-
-def zero_between(
-    of: Callable[[float], float], short: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]
-) -> float:
-    """Where a function is 0 between two points (x, y) with y of opposite signs: by secants, and halves at a jump."""
-    best = min(low, high, key=lambda point: abs(point[1]))
-    for trial in range(TRIALS):
-        (a, below), (b, above) = low, high
-        middle = 0.5 * (a + b) if trial % 3 == 2 else a - below * (b - a) / (above - below)
-        new = short(middle), of(short(middle))
-        best = min(best, new, key=lambda point: abs(point[1]))
-        if abs(best[1]) < ON_CIRCLE or b - a <= 1e-9 * max(abs(a), abs(b)):
-            break
-        low, high = (new, high) if (new[1] < 0.0) == (below < 0.0) else (low, new)
-    return best[0]
 
 
 def _crossing(value: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:

@@ -12,9 +12,11 @@ import pytest
 
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.theory.stability.frequency import delayed, expect_decided, loop_gains
-from orchestration.theory.stability.loop_halves import closed
-from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, step
+from orchestration.theory.stability import frequency
+from orchestration.theory.stability import linearise as linearise_module
+from orchestration.theory.stability.frequency import delayed, expect_decided
+from orchestration.theory.stability.loop_halves import closed, loop_gains
+from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import example
 from tests.extent import sample
@@ -111,6 +113,35 @@ def test_a_loop_that_is_late_by_its_delay_margin_is_between_stable_and_unstable(
     assert sooner < 1.0 < later
 
 
+@pytest.mark.parametrize(("period", "longest"), [(0.006, 0.016), (0.008, 0.012)])
+def test_a_delay_to_a_sampled_receiver_acts_where_a_message_misses_its_sample(period: float, longest: float) -> None:
+    """Also where rates meet: the margin is the last delay before a jump, as the loop made as late has it."""
+    one = system_of("dc_servo")
+    servo = dataclasses.replace(one.components["servo"], step=None, sampling=Sampling(period=period))
+    sampled = dataclasses.replace(one, components={**one.components, "servo": servo})
+    (loop,) = bode(sampled, "controller").loops
+    assert (loop.delay_margin, loop.delay_reason) == (longest, "")
+    late = [delayed(sampled, "controller", delay) for delay in (longest, longest + 1e-9)]
+    before, after = (linearise(each, "controller").radius for each in late)
+    assert before < 1.0 < after
+    found = locus(sampled, DELAY, first=0.0, last=0.03, count=3)
+    assert [one.value for one in found.crossings] == [pytest.approx(longest + 0.002, abs=1e-12)]
+    (crossing,) = found.crossings
+    assert math.hypot(crossing.real, crossing.imaginary) == pytest.approx(after, rel=1e-9)  # that which has jumped out
+
+
+def test_a_delay_margin_that_is_not_found_leaves_the_other_margins(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> float:
+        raise UsageError("the loop is stable with all delays")
+
+    monkeypatch.setattr(frequency, "delay_margin", fails)
+    monkeypatch.setattr(linearise_module, "isolated_call", lambda _, call, *args: call(*args))
+    found = bode(system_of("dc_servo"))
+    (loop,) = found.loops
+    assert (loop.delay_margin, loop.delay_reason) == (None, "the loop is stable with all delays")
+    assert found.verdict.endswith("phase margin 33.7°, delay margin not known (small deviations)")
+
+
 def test_a_loop_of_one_command_has_the_others_closed() -> None:
     """The sensitivity of a command is the entry of (I - C G)^-1 on the diagonal."""
     random = np.random.default_rng(5)
@@ -168,8 +199,8 @@ def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
     assert loop.delay_margin == pytest.approx(of_one.delay_margin, abs=2e-8)
     for mine, theirs in zip(loop.gain_margins, of_one.gain_margins, strict=True):
         assert (mine.factor, mine.frequency) == pytest.approx((theirs.factor, theirs.frequency), rel=1e-5)
-    for frequency in (1.0, 50.0, 300.0, 500.0):
-        sizes = [np.interp(frequency, each.frequencies, np.abs(each.gains[0])) for each in (found, known)]
+    for at in (1.0, 50.0, 300.0, 500.0):
+        sizes = [np.interp(at, each.frequencies, np.abs(each.gains[0])) for each in (found, known)]
         assert sizes[0] == pytest.approx(sizes[1], rel=1e-3)
     stepped, (of_step,) = step(both, "controller"), step_of("dc_servo").loops
     assert stepped.loops[0].overshoot == pytest.approx(of_step.overshoot, rel=1e-6)

@@ -1,0 +1,52 @@
+"""Where functions of one number pass zero."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+
+HALVINGS = 60
+ZERO = 1e-7
+"""Size of a value, as the distance of a spectral radius from 1, that counts as 0"""
+TRIALS = 80
+"""Most points that are tried"""
+SECANTS = 12
+"""Points from which on a range is only halved, as it is where the function jumps"""
+
+
+def sign_changes(frequencies: Floats, values: Floats) -> list[tuple[float, float]]:
+    """Neighbouring frequencies between which a value changes its sign."""
+    signs = np.sign(values)
+    places = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+    return [(float(frequencies[place]), float(frequencies[place + 1])) for place in places]
+
+
+def root(of: Callable[[float], float], low: float, high: float) -> float:
+    """Where a continuous function passes 0 between two points, by halves."""
+    rising = of(high) > of(low)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if (of(middle) > 0.0) == rising else (middle, high)
+    return 0.5 * (low + high)
+
+
+def zero_between(
+    of: Callable[[float], float], short: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]
+) -> tuple[float, float]:
+    """Where a function passes 0 between two points (x, y) with y of opposite signs: by secants and halves.
+
+    Two x: that of y below 0, then that above. They are one where the function is 0, and neighbours where it jumps.
+    """
+    for trial in range(TRIALS):
+        (a, below), (b, above) = low, high
+        secant, half = short(a - below * (b - a) / (above - below)), short(0.5 * (a + b))
+        middle = half if trial % 3 == 2 or trial > SECANTS or secant in (a, b) else secant
+        if middle in (a, b):
+            break
+        value = of(middle)
+        if abs(value) < ZERO:
+            return middle, middle
+        low, high = ((middle, value), high) if (value < 0.0) == (below < 0.0) else (low, (middle, value))
+    inside, outside = sorted((low, high), key=lambda point: point[1])
+    return inside[0], outside[0]
