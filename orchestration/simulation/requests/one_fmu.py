@@ -13,8 +13,10 @@ from fmpy.util import auto_interval
 from orchestration.components.fmi.access import Access, Interface, Solver
 from orchestration.components.fmi.read_description import Model, called, read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
+from orchestration.simulation.engines.resolved import table_of
 from orchestration.systems.signals.table_file import TIME, header_of, read_rows
 from orchestration.systems.system.component import Component, Parameter
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import component_names, experiment
 from orchestration.systems.system.source import Source
@@ -43,7 +45,8 @@ def alone(
     """The FMU at `path` as the only component, in continuous time; what is not given follows its default experiment.
 
     `interval` [s] is that of the communication points, `inputs` a CSV file with a column for each input that it feeds,
-    whose first and last row hold before and after. `start_time` and `stop_time` are times of the FMU; the run begins
+    whose first and last row hold before and after; where one jumps, the FMU has a communication point, unless it takes
+    steps of one length only. `start_time` and `stop_time` are times of the FMU; the run begins
     at 0. Raises `UsageError` for a file that is no FMU.
     """
     model = read_model(path)
@@ -58,9 +61,11 @@ def alone(
     if stop_time is None and not model.varies_step and end > step:
         end = step * math.floor(end / step + 1e-9)  # as fmpy: no shorter step at the end
     name = component_names([model])[0]
+    sources = {} if inputs is None else _sources(model, name, inputs, begin)
     component = Component(
         fmu=str(path),
         step=step,
+        points=tuple(sorted({time for time, _ in _jumps(sources, end)})) if model.varies_step else (),
         tolerance=tolerance,
         record=_recorded(model, record),
         parameters=dict(parameters or {}),
@@ -68,7 +73,6 @@ def alone(
         solver=solver,
         start_time=begin or None,
     )
-    sources = {} if inputs is None else _sources(model, name, inputs, begin)
     return System(stop_time=end, components={name: component}, sources=sources)
 
 
@@ -101,27 +105,28 @@ def late_jump(system: System) -> str | None:
     """The warning about inputs that jump between communication points: the first jump, and the step that has all."""
     (component,) = system.components.values()
     begin, step = Fraction(repr(component.start_time or 0.0)), Fraction(repr(component.step))
-    late: list[tuple[Fraction, str]] = []
-    for source in system.sources.values():
-        assert source.file is not None
-        assert source.columns is not None
-        rows = read_rows(source.file, (TIME, *source.columns))
-        may_jump = np.diff(rows.columns[TIME]) == 0.0 if source.interpolation == "linear" else True
-        for column, to in zip(source.columns, source.to):
-            jumps = np.flatnonzero((np.diff(rows.columns[column]) != 0.0) & may_jump) + 1
-            times = (Fraction(repr(time)) for time in rows.columns[TIME][jumps].tolist())
-            within = (time for time in times if begin < time < begin + Fraction(repr(system.stop_time)))
-            late += [(time, to.partition(".")[2]) for time in within if (time - begin) % step]
+    jumps = _jumps(system.sources, system.stop_time)
+    late = [(Fraction(repr(time)), name) for time, name in jumps if time not in component.points]
+    late = [(time, name) for time, name in late if time % step]
     if not late:
         return None
     first, name = min(late)
-    seen = begin + math.ceil((first - begin) / step) * step
-    shorter = functools.reduce(_common, (time - begin for time, _ in late), step)
+    shorter = functools.reduce(_common, (time for time, _ in late), step)
     advice = f"; --output-interval {float(shorter):.10g} has every jump at its time" if shorter >= SHORTEST else ""
     return (
-        f"input {name} jumps at {float(first)} s, between steps of {float(step):.10g} s: "
-        f"the FMU has it from {float(seen):.10g} s on{advice}"
+        f"input {name} jumps at {float(begin + first)} s, between steps of {float(step):.10g} s, which the FMU takes "
+        f"only: it has it from {float(begin + math.ceil(first / step) * step):.10g} s on{advice}"
     )
+
+
+def _jumps(sources: Mapping[str, Source], end: float) -> Iterator[tuple[float, str]]:
+    """The times of a run up to `end` at which inputs jump [s], and their names."""
+    for source in sources.values():
+        times, values = table_of(source, end)
+        may_jump = np.diff(times) == 0.0 if source.interpolation == "linear" else True
+        for column, to in zip(values.T, source.to):
+            jumps = times[1:][(np.diff(column) != 0.0) & may_jump].tolist()
+            yield from ((time, variable_of(to)) for time in jumps if 0.0 < time < end)
 
 
 def _common(one: Fraction, other: Fraction) -> Fraction:

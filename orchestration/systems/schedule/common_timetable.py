@@ -173,6 +173,8 @@ _KEPT = 32
 """Spans whose regular instants are cached"""
 _Points = tuple[tuple[Fraction, tuple[int, ...]], ...]
 """Distances of points [ns], and the components in continuous time, by their places, that are stepped to them"""
+_SinglePoints = tuple[tuple[tuple[int, ...], int], ...]
+"""Times of other points [ns], and the component that is stepped to them"""
 
 
 class CommonTimetable:
@@ -186,8 +188,10 @@ class CommonTimetable:
         expect_no_longer(system)
         self.system, self.fixed, self.plan = system, fixed, Plan(system)
         self.stop = nanoseconds(system.stop_time)
-        for each in fixed.values():
+        for name, each in fixed.items():
             each.expect_end(self.stop)
+            if system.components[name].points:
+                raise UsageError(f"components.{name}.points: it takes steps of one length only; expected none")
         if system.uses_scheduler:
             _expect_moves(system, fixed)
         names = list(system.components)
@@ -208,6 +212,9 @@ class CommonTimetable:
         """the approximate mean time between instants [ns]"""
         self._steps: _Points = tuple(
             (exact_nanoseconds(system.components[names[i]].step or 0.0), (int(self.place[i]),)) for i in self.points
+        )
+        self._single: _SinglePoints = tuple(
+            (tuple(map(nanoseconds, system.components[names[i]].points)), int(self.place[i])) for i in self.points
         )
         self._changes: _Points = tuple(
             (
@@ -249,16 +256,19 @@ class CommonTimetable:
 
     def regular(self, begin: int, end: int) -> Instants:
         """The regular instants from `begin` to before `end` [ns]: points, changes of sources, the start and the end."""
-        return _regular(self._steps, self._changes, self.stop, begin, end)
+        return _regular(self._steps, self._single, self._changes, self.stop, begin, end)
 
 
 @lru_cache(_KEPT)
-def _regular(steps: _Points, changes: _Points, stop: int, begin: int, end: int) -> Instants:
+def _regular(steps: _Points, single: _SinglePoints, changes: _Points, stop: int, begin: int, end: int) -> Instants:
     """The regular instants of all systems with these steps and changes of sources: they do not follow from samples."""
     found = InstantCollector(len(steps))
     for distance, places in steps:
         grid = Grid(Fraction(0), distance)
         found.add(grid.between(grid.index_from(begin), grid.index_from(end)), *places)
+    for times, place in single:
+        points = np.array(times, dtype=np.int64)
+        found.add(points[(points >= begin) & (points < min(end, stop))], place)
     if begin == 0:
         found.add(np.zeros(1, dtype=np.int64))
     for distance, places in changes:  # the value at the start is that of initialisation

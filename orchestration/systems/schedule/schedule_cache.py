@@ -39,7 +39,7 @@ def schedule_key(system: System) -> ScheduleKey:
     samplings = [c.sampling for c in system.components.values() if c.sampling is not None]
     regular = (
         system.stop_time,
-        tuple((name, c.step, c.sampling) for name, c in system.components.items()),
+        tuple((name, c.step, c.points, c.sampling) for name, c in system.components.items()),
         tuple(content(each.jitter) for each in samplings),
         tuple(
             (content(x.delay), content(x.delay_jitter), x.jitter_distribution, content(x.loss), x.burst_length)

@@ -15,6 +15,7 @@ import numpy as np
 from orchestration.foundation.basics.documents import readable
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import NANOSECONDS, seconds
 
 LONGEST_LINE = 2**17
 """The most characters of a line, so that a file without line ends is not read whole"""
@@ -55,7 +56,7 @@ def read_table(
     """Times (n,) [s] from its time `begin` on, and the values of `columns` (n, m), of a CSV file with a column `time`.
 
     Rows of one time jump. Raises `UsageError` if a column is missing, a value is not finite, time decreases or the
-    table does not cover `begin` to begin + stop_time, unless its ends are `held`.
+    table does not cover `begin` to begin + stop_time, unless its ends are `held`; times are then whole nanoseconds.
     """
     rows = read_rows(path, (TIME, *columns))
     rows.expect_increasing_times(jumps=True)
@@ -63,7 +64,12 @@ def read_table(
     if not held and (time[0] > begin or time[-1] < begin + stop_time):
         end = f"{begin + stop_time:g} s" if begin else f"stop_time = {stop_time:g} s"
         raise UsageError(f"{path}: covers {time[0]:g} to {time[-1]:g} s, expected {begin:g} to {end}")
-    return time - begin, np.column_stack([rows.columns[name] for name in columns])
+    time = time - begin
+    if held:
+        time = seconds(np.rint(time * NANOSECONDS))  # as the instants of the run: 3 * 0.1 is no time after 0.3
+        if time[-1] <= time[-2]:
+            raise rows.error(len(time) - 1, TIME, "a time that is a nanosecond later, at the least")
+    return time, np.column_stack([rows.columns[name] for name in columns])
 
 
 def read_rows(path: Path, columns: Sequence[str]) -> TableRows:

@@ -3,6 +3,7 @@
 A digital task runs at every period of its own clock, as a task of a computer, or when a message arrives.
 """
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from fractions import Fraction
@@ -132,6 +133,8 @@ class Component:
     step: float | None = None
     """The distance of the communication points [s] of a component in continuous time; a component has either this or
     `sampling`."""
+    points: tuple[float, ...] = ()
+    """More communication points of such a component [s], as where its inputs jump."""
     sampling: Sampling | None = None
     """The times at which a digital task runs; a component has either this or `step`, or neither if it is the task of a
     computer."""
@@ -172,6 +175,10 @@ class Component:
         if self.step is not None:
             require_positive(self, "step")
             require(is_at_least(self.step, 1.0), "step", self.step, "at least a nanosecond")
+        if self.points:
+            require(self.step is not None, "points", len(self.points), "none without step")
+            is_increasing = all(one < other for one, other in itertools.pairwise((0.0, *self.points)))
+            require(is_increasing and is_finite(self.points[-1]), "points", self.points, "positive times that increase")
         if self.partition is not None:
             require(self.interface in (None, SCHEDULED), "interface", self.interface, f"{SCHEDULED} beside partition")
             require(self.step is None, "step", self.step, "none beside partition, which is sampled or a task")

@@ -81,18 +81,60 @@ def test_a_default_end_that_is_long_is_said_with_its_steps(here: Path) -> None:
     assert not [*remarks(system, is_default_end=False)]
 
 
+def numbers(rows: list[str]) -> list[float]:
+    """All cells, one after the other; False and True as 0 and 1."""
+    cells = " ".join(rows).replace(",", " ").split()
+    return [float({"False": 0, "True": 1}.get(cell, cell)) for cell in cells]
+
+
+OFF = "time,u,on\n0,1,0\n0.1,1,1\n0.2534,2,1\n0.2534,3,1\n0.30000000000000004,4,1\n2,4,0\n"
+
+
 @needs_compiler
-def test_a_jump_between_two_steps_is_warned_of_with_the_step_that_has_it(main: Main, here: Path) -> None:
-    inputs, fmu = here / "off.csv", known(small(here))
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_step_ends_where_an_input_jumps_as_in_fmpy(main: Main, here: Path, fmi: int) -> None:
+    inputs, fmu = here / "off.csv", known(small(here, fmi=fmi))
+    rows = [line.split(",") for line in OFF.splitlines()]
+    array = {2: "{0}", 3: "{0} {0}"}[fmi]
+    inputs.write_text("time,u,on\n" + "".join(f"{t},{array.format(u)},{on}\n" for t, u, on in rows[1:]))
+    flags = ("--in-process", "--inputs", inputs, "--output", "out.csv", "--stop-time", "1")
+    for interval in (0.1, 0.3):
+        ran = main("run", fmu, *flags, "--output-interval", str(interval))
+        assert "jumps" not in ran.stderr
+        by_fmpy(fmu, inputs, stop_time=1.0, output_interval=interval)
+        one, other = (Path(name).read_text().splitlines() for name in ("out.csv", "by_fmpy.csv"))
+        assert one[0] == other[0]
+        assert numbers(one[1:]) == pytest.approx(numbers(other[1:]), abs=1e-9)
+        assert any(line.startswith("0.2534,") for line in one)
+
+
+@needs_compiler
+def test_a_jump_inside_of_a_step_that_cannot_end_there_is_warned_of_with_the_step_that_has_it(
+    main: Main, here: Path
+) -> None:
+    inputs, fmu = here / "off.csv", known(small(here, fixed_step=True))
     flags = ("--in-process", "--inputs", inputs, "--stop-time", "1")
-    inputs.write_text("time,u,on\n0,1,0\n0.1,1,1\n0.2534,2,1\n0.2534,3,1\n0.3,4,1\n2,4,0\n")
+    inputs.write_text(OFF)
     warned = main("run", fmu, *flags, "--output-interval", "0.1").stderr
-    late = "off.csv: input u jumps at 0.2534 s, between steps of 0.1 s: the FMU has it from 0.3 s on; "
-    assert f"{late}--output-interval 0.0002 has every jump at its time" in warned
+    assert "off.csv: input u jumps at 0.2534 s, between steps of 0.1 s, which the FMU takes only: " in warned
+    assert "it has it from 0.3 s on; --output-interval 0.0002 has every jump at its time" in warned
     assert warned.count("jumps") == 1
     assert "jumps" not in main("run", fmu, *flags, "--output-interval", "0.0002").stderr
-    inputs.write_text("time,on\n0,0\n0.25,1\n2,1\n")
+    inputs.write_text("time,on\n0,0\n0.25,1\n0.3000000000000001,0\n2,1\n")
     assert "input on jumps at 0.25 s" in main("run", fmu, *flags, "--output-interval", "0.1").stderr
+
+
+@needs_compiler
+def test_points_are_refused_where_no_step_ends_at_them(here: Path) -> None:
+    def refused(**component: Any) -> str:
+        with pytest.raises(UsageError) as refusal:
+            run({"stop_time": 1.0, "components": {"it": {"fmu": str(fmu), "step": 0.5, **component}}}, in_process=True)
+        return str(refusal.value)
+
+    fmu = known(small(here))
+    assert "points = (0.3, 0.2): expected positive times that increase" in refused(points=[0.3, 0.2])
+    fmu = known(small(here / "fixed", fixed_step=True))
+    assert "components.it.points: it takes steps of one length only; expected none" in refused(points=[0.2])
 
 
 @needs_compiler

@@ -89,6 +89,8 @@ class Shape:
             if one.start_time:
                 where = f"components.{name}.start_time = {one.start_time:g}"
                 raise UsageError(f"{where}: expected 0 for one of many at once, or in a page")
+            if one.points:
+                raise UsageError(f"components.{name}.points: expected none for one of many at once, or in a page")
 
     # -- components and connections --------------------------------------------------------------------------------
 

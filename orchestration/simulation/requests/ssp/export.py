@@ -102,7 +102,7 @@ def _unsupported(system: System, models: Mapping[str, Model]) -> Iterator[str]:
         interface = called(models[name], component.access).interface
         if interface != "co-simulation":
             yield f"components.{name}.interface = {interface}: an SSP is written of co-simulation alone; expected that"
-        yield from _unsupported_fields(f"components.{name}", component, ("start_time",))
+        yield from _unsupported_fields(f"components.{name}", component, ("start_time", "points"))
         if component.sampling is not None:
             yield from _unsupported_fields(f"components.{name}.sampling", component.sampling, ("jitter", "clock_ratio"))
     for table in ("computers", "networks"):
