@@ -73,7 +73,9 @@ def test_bounds_are_declared(description: ModelDescription) -> None:
 QUANTITIES = {
     "m": "Length", "m/s": "Velocity", "m/s2": "Acceleration", "m/s3": "Jerk", "rad": "Angle",
     "rad/s": "AngularVelocity", "rad/s2": "AngularAcceleration", "kg": "Mass", "kg.m2": "MomentOfInertia",
-    "N": "Force", "N.m": "Torque", "s": "Time", "J": "Energy",
+    "N": "Force", "N.m": "Torque", "s": "Time", "J": "Energy", "W": "Power", "Hz": "Frequency", "m2": "Area",
+    "m3": "Volume", "kg/m3": "Density", "kg/s": "MassFlowRate", "Pa": "Pressure", "K": "ThermodynamicTemperature",
+    "A": "ElectricCurrent", "V": "ElectricPotential", "C": "ElectricCharge",
 }  # fmt: skip
 """As Modelica's library calls them"""
 

@@ -51,6 +51,7 @@ def heat_map(
     cells.hatch(panel, x, y, np.isnan(kind))
     has_limit = cells.limit(panel, x, y, good) is not None
     panel.set(xlabel=across.title, ylabel=up.title, xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
+    cells.name_cells(panel, *(each.of(np.unique(coded[axis.name])) for axis, each in zip(axes, (across, up))))
     named = labels.metric_with_unit(metric, units.get(metric))
     cells.color_bar(panel, mesh, shown, f"{named}, where {words[0]}")
     outcomes = {*table["outcome"].dropna()}

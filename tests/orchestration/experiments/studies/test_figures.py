@@ -217,6 +217,7 @@ def test_a_map_has_a_cell_for_each_run_and_the_boundary_of_good_runs() -> None:
     assert values[0, :4] == pytest.approx([0.01, 0.02, 0.03, 0.04])
     crossings = np.concatenate([path.vertices for path in boundary.get_paths()])
     assert crossings[:, 0] == pytest.approx(45.0)
+    assert [*figure.axes[0].get_yticks()] == [0.0, 10.0, 20.0]  # none below zero, at the edge of the lowest cells
 
 
 def test_cells_of_a_map_have_their_edges_half_way_between_values_in_the_scale_of_the_axis() -> None:
