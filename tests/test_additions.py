@@ -19,6 +19,11 @@ from tests.slaves import get, put
 
 PAGES = {path: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))}
 TESTS = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+DRAWN = "".join(
+    path.read_text(encoding="utf-8")
+    for name in ("figures", "schedule")
+    for path in (ROOT / "tests").rglob(f"test_{name}.py")
+)
 COMMANDS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 FIGURES = sorted({name for view in VIEWS.values() for name in view.names})
 
@@ -81,27 +86,32 @@ def test_the_page_of_systems_has_every_function_of_the_language() -> None:
     row = re.search(
         r"^\| at one instant \| over a run \|\n\|.*\n\|(.*)\|(.*)\|$", PAGES[ROOT / "docs/systems.md"], re.M
     )
-    assert row is not None
-    assert words(row[1]) == {name for name, made in OPERATORS.items() if made.tree is None}
-    assert words(row[2]) == {*REDUCTIONS}
+    assert row is not None, "docs/systems.md: expected the table | at one instant | over a run |"
+    for cell, known in ((row[1], {n for n, made in OPERATORS.items() if made.tree is None}), (row[2], {*REDUCTIONS})):
+        assert words(cell) == known, f"{words(cell) ^ known}: expected the same in the table of docs/systems.md"
 
 
 def test_the_page_of_figures_has_every_figure_of_a_run() -> None:
     of_runs = PAGES[ROOT / "docs/figures.md"].partition("## Of a run")[2].partition("\n## ")[0]
-    assert words(*re.findall(r"^\| (`.*?`) \|", of_runs, re.M)) - {"--figure"} == {*FIGURES}
+    rows = words(*re.findall(r"^\| (`.*?`) \|", of_runs, re.M)) - {"--figure"}
+    assert rows == {*FIGURES}, f"{rows ^ {*FIGURES}}: expected the same in the table of docs/figures.md, Of a run"
 
 
 @pytest.mark.parametrize("kind", VIEWS)
 def test_every_figure_has_its_maker(kind: str) -> None:
-    assert {*VIEWS[kind].load().makers} == {*VIEWS[kind].names}
+    makers, names = {*VIEWS[kind].load().makers}, {*VIEWS[kind].names}
+    assert makers == names, f"{makers ^ names}: expected a maker in figures.py of orchestration/quadrotor/flight"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_page_and_a_test_have_every_command(name: str) -> None:
-    assert any(re.search(rf"\bquadcosim {name}\b", text) for text in PAGES.values())
-    assert f'"{name}"' in TESTS
+    shown = any(re.search(rf"\bquadcosim {name}\b", text) for text in PAGES.values())
+    assert shown, f"quadcosim {name}: expected a line with it in a page of docs/"
+    is_called = f'"{name}"' in TESTS
+    assert is_called, f'"{name}": expected a test of tests/orchestration/command that calls it'
 
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_test_has_every_figure(name: str) -> None:
-    assert f'"{name}"' in TESTS
+    is_drawn = f'"{name}"' in DRAWN
+    assert is_drawn, f'"{name}": expected a test of what it draws, in a test_figures.py of tests/orchestration'

@@ -19,14 +19,15 @@ from orchestration.quadrotor.scenarios.wiring import COMMAND, POSITION
 from orchestration.simulation.results import objectives
 from orchestration.simulation.results.objectives import Metrics
 from orchestration.systems.system.choices import Hold
+from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.paths import changed
 from plant_fmu.actuators import Channels, Motors
+from tests.orchestration.quadrotor.scenarios.named_signals import beyond_exchanged
 
 Array = npt.NDArray[np.float64]
 
 TIME = np.linspace(0.0, 3.0, 3001)
 ATTITUDE_ERROR_SCALAR = "attitude_error.w"
-AT_SAMPLES = (ATTITUDE_ERROR_SCALAR, wiring.ENERGY)
 
 
 def attitude(scalar: Array) -> dict[str, Any]:
@@ -48,17 +49,24 @@ def measured(
     motor_max: float = 0.0,
     cuts: Sequence[int] = (),
     divergence_time: float | None = None,
-    **controller: Array,
+    **others: Array,
 ) -> Metrics:
-    """The metrics of a flight whose position error has this norm, spread over the axes as 2:-3:6."""
+    """The metrics of a flight whose position error has this norm, spread over the axes as 2:-3:6.
+
+    `others`: what objectives name beside position, command and limits, without its component; default: 1.
+    """
     zero = np.zeros(len(t))
     desired = np.column_stack([zero + 1.0, zero - 2.0, 0.1 * t])
     position = desired + np.outer(zero + error, np.array([2.0, -3.0, 6.0]) / 7.0)
+    motors = {"thrust_max": motor_max, "thrust_min": 0.1, "arm.x": 0.2, "arm.y": 0.1, "drag_to_thrust": 0.02}
+    limits = {"plant.thrust_max": thrust_max, "plant.thrust_min": 0.0, "plant.torque_max": torque_max}
+    limits |= {f"plant.motor.{name}": value for name, value in motors.items()}
+    named = sorted(set().union(*beyond_exchanged().values()) - {*limits})
     signals = {
         "time": t,
         **{f"plant.{name}": position[:, i] for i, name in enumerate(POSITION)},
         **{f"plant.{name}": (command or {}).get(name, zero) for name in COMMAND},
-        **{f"controller.{name}": controller.get(name, zero + 1.0) for name in AT_SAMPLES},
+        **{name: others.get(variable_of(name), zero + 1.0) for name in named},
         **{name: desired[:, i] for i, name in enumerate(wiring.POSITION_REFERENCE)},
     }
     marks = {"sampled": (sampled, "measurement"), "arrived": (arrived, "command")}
@@ -70,9 +78,6 @@ def measured(
     end = float(t[-1])
     system = changed(quadrotor(), {"stop_time": planned or end or 1.0, "connections.command.hold": hold})
     recording = recorded(signals, sorted(events), cuts)
-    motors = {"thrust_max": motor_max, "thrust_min": 0.1, "arm.x": 0.2, "arm.y": 0.1, "drag_to_thrust": 0.02}
-    limits = {"plant.thrust_max": thrust_max, "plant.thrust_min": 0.0, "plant.torque_max": torque_max}
-    limits |= {f"plant.motor.{name}": value for name, value in motors.items()}
     return objectives.compute(
         system,
         lambda: objectives.spans(system, recording, limits, end),
