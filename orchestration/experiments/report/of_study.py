@@ -19,7 +19,7 @@ from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.store import note_on_engines, open_for_reading
-from orchestration.experiments.studies.store_columns import TEXTS, UNITS
+from orchestration.experiments.studies.store_columns import GUIDS, TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.sweep import AGREEMENT, expect_current
 from orchestration.foundation.basics.errors import UsageError
@@ -316,7 +316,10 @@ def provenance_of(about: Mapping[str, str]) -> list[tuple[str, str]]:
     """Versions and GUIDs in a store, and its machine."""
     place: dict[str, Any] = json.loads(about.get("place", "{}"))
     versions = {f"version of {name}": text for name, text in json.loads(about.get("versions", "{}")).items()}
-    guids = {f"GUID of the {name}": text for name, text in json.loads(about.get("guids", "{}")).items()}
+    guids: dict[str, str] = {}
+    for name, guid in json.loads(about.get(GUIDS, "{}")).items():
+        each = {"": guid} if isinstance(guid, str) else {f" {', '.join(map(str, at))}": one for at, one in guid["of"]}
+        guids |= {f"GUID of the {name}{at}": text for at, text in each.items()}
     machine = {"machine": str(place["machine"])} if "machine" in place else {}
     agreement = {"lanes": str(LaneAgreement.from_text(about[AGREEMENT]))} if AGREEMENT in about else {}
     return [*versions.items(), *guids.items(), *machine.items(), *agreement.items()]

@@ -5,6 +5,7 @@ import hashlib
 import json
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -242,7 +243,7 @@ def place_parts(study: Study, files: Files) -> dict[str, str]:
 def difference(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """The changes in a few words; empty if there are none."""
     differing = [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
-    changes = [f"{n} was {_short(before.get(n))}, is {_short(now.get(n))}" for n in differing[:_MAX_SETTINGS]]
+    changes = [f"{name} {_change(before.get(name), now.get(name))}" for name in differing[:_MAX_SETTINGS]]
     more = f"; and {len(differing) - _MAX_SETTINGS} more" if len(differing) > _MAX_SETTINGS else ""
     return "; ".join(changes) + more
 
@@ -250,7 +251,15 @@ def difference(before: Mapping[str, str], now: Mapping[str, str]) -> str:
 _MAX_SETTINGS, _MAX_LENGTH = 3, 60
 
 
-def _short(text: str | None) -> str:
+def _change(before: str | None, now: str | None) -> str:
+    """What a text was and is, each from shortly before where they differ if it is long."""
+    same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(before or "", now or "")))
+    return f"was {_short(before, same)}, is {_short(now, same)}"
+
+
+def _short(text: str | None, same: int) -> str:
     if text is None:
         return "absent"
-    return text if len(text) <= _MAX_LENGTH else f"{text[: _MAX_LENGTH - 3]}..."
+    first = 0 if len(text) <= _MAX_LENGTH else max(0, min(same - _MAX_LENGTH // 4, len(text) - _MAX_LENGTH))
+    shown = text[first : first + _MAX_LENGTH]
+    return f"{'...' if first else ''}{shown}{'...' if first + len(shown) < len(text) else ''}"

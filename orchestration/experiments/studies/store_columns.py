@@ -23,6 +23,8 @@ OBJECTIVES = "objectives"
 """Name of the entry of `about` that lists the objectives, written when the store is created"""
 UNITS = "units"
 """Name of the entry of `about` with the units of metrics"""
+GUIDS = "guids"
+"""Name of the entry of `about` with the GUIDs of FMUs"""
 ABOUT = "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, checksum TEXT NOT NULL)"
 
 

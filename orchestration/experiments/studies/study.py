@@ -126,9 +126,10 @@ class Study:
 
         Raises `UsageError` for an invalid value.
         """
-        return self._system(self.points[index], starts)
+        return self.system_at(self.points[index], starts)
 
-    def _system(self, point: Mapping[str, Value], starts: StartValues) -> System:
+    def system_at(self, point: Mapping[str, Value], starts: StartValues) -> System:
+        """The system with a value of each axis, likewise."""
         changes: dict[str, Any] = {}
         chosen = {
             path: point[axis.name] for axis in self.axes for path in self.paths_of(axis.targets) if names_fmu(path)
@@ -175,6 +176,11 @@ class Study:
     def paths_of(self, targets: Iterable[str]) -> Iterator[str]:
         """The paths of its targets."""
         return (path for target in targets for path in self._paths[target])
+
+    def axes_of(self, path: str) -> list[Axis]:
+        """The axes that set a path, themselves or with others."""
+        linked = {name for each in self.together if path in self.paths_of(each.targets) for name in each.axes}
+        return [axis for axis in self.axes if axis.name in linked or path in self.paths_of(axis.targets)]
 
     def keeps_signals(self, index: int) -> bool:
         """Whether the signals of a run are kept."""

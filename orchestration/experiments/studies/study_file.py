@@ -214,7 +214,11 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
 
 
 def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
-    """Listed values: paths made relative to the study file, distributions as the text of their table."""
+    """Listed values: paths relative to the study file made absolute, distributions as the text of their table.
+
+    So values are the same from whichever folder a study is run.
+    """
+    folder = Path(os.path.abspath(folder))
     are_paths = all(
         names_fmu(target) or is_source_file(target) or target.endswith(".fmu") or target in CONTROLLER
         for target in targets

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from orchestration.experiments.studies.checks import Checked, check_design, desc
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
 from orchestration.experiments.studies.run_key import CONTENT, design_parts, difference, place_parts, study_parts
-from orchestration.experiments.studies.store_columns import UNITS
+from orchestration.experiments.studies.store_columns import GUIDS, UNITS
 from orchestration.experiments.studies.study import StartValues, Study
 from orchestration.experiments.studies.study_file import FileLike, load_study
 from orchestration.experiments.studies.swept import Swept
@@ -94,11 +95,17 @@ def sweep(
     columns, execution, follows = prepare(study, engine)
     study, files = columns.study, columns.files
     path = store.store_path(study.name, folder)
-    with runs_reporter(progress) as report, store.open_for_writing(path, study.metric_names) as opened:
+    with (
+        runs_reporter(progress) as report,
+        store.open_for_writing(path, study.metric_names) as opened,
+        contextlib.ExitStack() as stack,
+    ):
         _expect_same_study(opened, columns)
         if engine == "auto":
             before = opened.about().get(ENGINE, execution.name)
             execution = execution.as_before(before, str(path), "another one needs another --out")
+        all_files = with_python_twins(files) if execution.in_lanes else files
+        reached = None if dask is None else stack.enter_context(cluster(Inputs.of(all_files), dask))
         _describe(opened, columns)  # last, so that what is refused changes nothing
         missing = _missing(opened, study, retry_failed)
         sweep_progress = _Progress(study, missing, report, announce)
@@ -107,7 +114,6 @@ def sweep(
             opened.describe({ENGINE: execution.name})
             if announce is not None and engine == "auto":
                 execution.tell(announce)
-            all_files = with_python_twins(files) if execution.in_lanes else files
             task_of = partial(_task, study, files.start_values, time_limit)
             sample, chunk = Sample(), partial(chunks, total=len(missing), workers=workers)
             windows = _windows(opened, missing[:, 0])
@@ -119,7 +125,7 @@ def sweep(
                     task_of(i, key, execution.engine) for some, keys in windows for i, key in zip(some.tolist(), keys)
                 )
             try:
-                with _workers(Inputs.of(all_files), workers, dask) as run:
+                with _workers(all_files, workers, reached) as run:
                     with contextlib.closing(run(tasks)) as results:
                         for rows in results:
                             _keep(rows, opened)
@@ -169,9 +175,9 @@ def _expect_workers(workers: int, dask: str | None) -> None:
         expect_scheduler(dask)
 
 
-def _workers(inputs: Inputs, workers: int, dask: str | None) -> AbstractContextManager[TaskRunner]:
-    """The workers that run tasks, local or on a cluster."""
-    return local_workers(inputs, workers) if dask is None else cluster(inputs, dask)
+def _workers(files: Files, workers: int, reached: TaskRunner | None) -> AbstractContextManager[TaskRunner]:
+    """The workers that run tasks: those of the cluster that was reached, else local ones."""
+    return local_workers(Inputs.of(files), workers) if reached is None else contextlib.nullcontext(reached)
 
 
 def expect_current(opened: store.Store, study: Study) -> None:
@@ -309,7 +315,7 @@ def _describe(opened: store.Store, columns: RunColumns) -> None:
             TOTAL: str(len(study.points)),
             AXES: json.dumps([axis.name for axis in study.axes]),
             "grid": json.dumps(grid if all(axis.values is not None for axis in study.axes) else None),
-            "guids": json.dumps({name: m.description.guid for name, m in files.models_of(study.origin).items()}),
+            GUIDS: json.dumps(_guids(study, files)),
             "versions": json.dumps(versions()),
             UNITS: json.dumps(_units(study, files)),
         },
@@ -319,6 +325,19 @@ def _describe(opened: store.Store, columns: RunColumns) -> None:
             for point in zip(block.indices.tolist(), columns.keys(block), block.settings)
         ),
     )
+
+
+def _guids(study: Study, files: Files) -> dict[str, Any]:
+    """The GUIDs of FMUs by component; where axes choose the FMU, those axes, and the GUID for each of their values."""
+    guids: dict[str, Any] = {}
+    first = study.points[0]
+    for name, model in files.models_of(study.origin).items():
+        values = {axis.name: axis.values or () for axis in study.axes_of(f"components.{name}.fmu")}
+        guids[name] = {"axes": [*values], "of": []} if values else model.description.guid
+        for chosen in product(*values.values()) if values else ():
+            system = study.system_at({**first, **dict(zip(values, chosen))}, files.start_values)
+            guids[name]["of"].append([[*chosen], files.models_of(system)[name].description.guid])
+    return guids
 
 
 def _units(study: Study, files: Files) -> dict[str, str]:

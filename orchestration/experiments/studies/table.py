@@ -13,7 +13,7 @@ from pyarrow import csv
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies.shares import differences_of, laws_of, shares_of, with_chance
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
-from orchestration.experiments.studies.store_columns import SETTINGS, TEXTS, UNITS
+from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import warn
@@ -47,10 +47,17 @@ def frame(path: Path) -> "pd.DataFrame":
         table[name] = table[name].astype("Int64")
     settings = settings.drop(columns=[name for name in settings if name in table])  # only an axis of seeds can coincide
     table = pd.concat([table[["design_index"]], settings, table.drop(columns="design_index")], axis=1)
-    for kind, prefix in (("guids", "guid"), ("versions", "version")):
-        for name, value in json.loads(about[kind]).items():
-            table[f"{prefix}.{name}"] = value
+    for name, guid in json.loads(about[GUIDS]).items():
+        table[f"guid.{name}"] = guid if isinstance(guid, str) else _guids_by_row(guid, settings_by_axis)
+    for name, version in json.loads(about["versions"]).items():
+        table[f"version.{name}"] = version
     return table
+
+
+def _guids_by_row(guid: Mapping[str, Any], settings: Mapping[str, Sequence[Any]]) -> list[Any]:
+    """The GUID of each row by the values of the axes that choose its FMU."""
+    known = {tuple(values): one for values, one in guid["of"]}
+    return [known.get(values) for values in zip(*(settings[axis] for axis in guid["axes"]))]
 
 
 def note_in(table: "pd.DataFrame") -> str | None:

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 
+import quadcosim
 from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, lines
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
@@ -192,6 +193,13 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert drawn == ["figures/good.png"]
     main("draw", "study.toml", "--store", "results/study/study.sqlite", "--out", "figures", "--format", "png")
     main("export", "study.toml", "--format", "csv")
+    runs = pd.read_csv(tmp_path / "results/study/runs.csv")
+    guids = {
+        law: {quadcosim.read_model(fmu).description.guid for fmu in (law, f"native/{law}")}
+        for law in runs["controller"].unique()
+    }
+    assert len(guids) == runs["guid.controller"].nunique() == 2
+    assert all(guid in guids[law] for law, guid in zip(runs["controller"], runs["guid.controller"]))
     shares = pd.read_csv(tmp_path / "results/study/shares.csv")
     assert list(shares) == ["controller", "timing.period", "count", "good", "share", "low", "high"]
     assert shares["count"].tolist() == [2, 2, 2, 2]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestration.experiments.studies.run_key import difference
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
@@ -113,6 +114,22 @@ def test_an_axis_may_have_distributions_with_their_traces(tmp_path: Path) -> Non
     assert found == [Distribution(uniform=(0.0, 0.002)), trace]
     assert study.points[0] == {"timing.delay": "{uniform = [0, 0.002]}"}
     assert study.files().tables[str(trace.file)] == trace.file
+
+
+def test_files_on_an_axis_are_the_same_from_every_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "study.toml").write_text('[[axes]]\nname = "controller"\nvalues = ["one.fmu", "UnifiedController"]\n')
+    axes = []
+    for folder, path in ((tmp_path, "study.toml"), (tmp_path.parent, f"{tmp_path.name}/study.toml")):
+        monkeypatch.chdir(folder)
+        axes.append(load_study(path).axes)
+    assert axes[0] == axes[1]
+    assert axes[0][0].values == (str(tmp_path / "one.fmu"), "UnifiedController")
+
+
+def test_a_difference_of_long_texts_shows_where_they_differ() -> None:
+    before, now = ("0" * 100 + end + "1" * 100 for end in ("a", "b"))
+    said = difference({"axis": before, "one": "1"}, {"axis": now, "one": "2"})
+    assert said == f"axis was ...{'0' * 15}a{'1' * 44}..., is ...{'0' * 15}b{'1' * 44}...; one was 1, is 2"
 
 
 def test_noise_of_one_measurement_leaves_that_of_others(tmp_path: Path) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
+from orchestration.experiments.studies import sweep as sweeping
 from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.store import open_for_reading
+from orchestration.experiments.studies.store import open_for_reading, store_path
 from orchestration.experiments.studies.study import Study
 from orchestration.simulation.workers import executors
 from orchestration.simulation.workers.executors import SILENCE, TOLD_AFTER, Heartbeat, RunEvaluator
@@ -55,6 +56,20 @@ def test_a_dask_cluster_makes_the_same_rows(
     monkeypatch.chdir(folder)
     main("sweep", "study.toml", "--engine", "compiled", "--dask", cluster.address)
     assert bits(folder / STORE) == reference
+
+
+def test_without_workers_the_design_of_a_store_does_not_grow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unreachable(inputs: Any, address: str) -> Any:
+        raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there")
+
+    sweep(study(axis("timing.period", 0.01), base=short()), folder=tmp_path, progress=None, announce=None)
+    monkeypatch.setattr(sweeping, "cluster", unreachable)
+    monkeypatch.setattr(sweeping, "expect_scheduler", lambda address: None)
+    more = study(axis("timing.period", 0.01, 0.02), base=short())
+    with pytest.raises(QuadcosimError, match="expected a dask scheduler with workers there"):
+        sweep(more, folder=tmp_path, dask="tcp://nowhere:8786", progress=None, announce=None)
+    with open_for_reading(store_path("study", tmp_path)) as store:
+        assert store.about()["total"] == "1"
 
 
 @in_test_all
