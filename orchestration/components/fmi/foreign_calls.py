@@ -29,7 +29,7 @@ def isolated_call(fmus: Iterable[Path], function: Callable[..., T], *arguments: 
         return function(*arguments)
     try:
         with Child(
-            subprocesses.Module.of("orchestration.components.fmi.foreign_process"),
+            subprocesses.Module("orchestration.components.fmi.foreign_process", (), loads=(function.__module__,)),
             limits=replace(UNLIMITED, memory=Limits.memory),
         ) as child:
             child.send((function, arguments))

@@ -1,8 +1,8 @@
 """Processes forked from one that has already imported their module (Linux).
 
 Importing a module of this project takes a new Python up to 0.4 s, a fork takes milliseconds. A server is a process that
-has imported one module and does nothing but fork; there is one for each module and each set of the variables that a
-process reads when it starts. A server ends with this process.
+has imported one module, and what its processes load, and does nothing but fork; there is one for each module and each
+set of the variables that a process reads when it starts. A server ends with this process.
 """
 
 import contextlib
@@ -30,6 +30,8 @@ ANSWER = struct.Struct("<?q")
 """False and the process's id, or minus the error number if it cannot start; True and its exit code, at its end"""
 _READ_AT_START = ("PYTHON", "LD_", "LC_", "LANG", "OPENBLAS_", "OMP_", "MKL_", "MALLOC_", "GLIBC_", "COVERAGE_", "TZ")
 """Prefixes of the environment variables that are read only when a process starts or loads a library"""
+_SLOW_TO_LOAD = ("fmpy.validation", "lxml.etree", "numpy.ctypeslib", "platformdirs", "pydantic.dataclasses")
+"""Modules that a forked process is expected to load if this process has"""
 _PATIENCE = 10.0
 """Time within which an unused server must exit [s]"""
 _STARTS_WITHIN = 60.0
@@ -106,8 +108,8 @@ class ForkServer:
         """Whether it can fork."""
         return self.close.alive and self._process.poll() is None
 
-    def fork(self, request: ForkRequest, piped: tuple[bool, bool, bool]) -> ForkedProcess:
-        """A process; `piped` as in `forked`.
+    def fork(self, request: ForkRequest, loads: list[str], piped: tuple[bool, bool, bool]) -> ForkedProcess:
+        """A process that has loaded some modules; `piped` as in `forked`.
 
         Raises `ConnectionError` or `EOFError` if the server has ended or does not answer, `OSError` if it cannot fork.
         """
@@ -121,7 +123,7 @@ class ForkServer:
                 its.callback(os.close, end)
                 descriptors.append(end)
                 pipes.append(None if pipe is None else own.enter_context(pipe))
-            socket.send_fds(self._connection, [b"!"], descriptors)
+            socket.send_fds(self._connection, [" ".join(loads).encode()], descriptors)
             its.close()
             content = pickle.dumps(request)
             channel.settimeout(_STARTS_WITHIN)
@@ -158,10 +160,11 @@ def forked(
     request = ForkRequest(
         arguments=module.arguments, environment=dict(environment), folder=str(folder or os.getcwd()), umask=_umask()
     )
+    loads = [module.name, *module.loads, *(name for name in _SLOW_TO_LOAD if name in sys.modules)]
     for _ in range(2):  # the server may just have been killed
         server = _server_for(module.name, environment)
         try:
-            return server.fork(request, piped)
+            return server.fork(request, loads, piped)
         except (ConnectionError, EOFError):
             server.close()
         except OSError:

@@ -1,8 +1,9 @@
 """A server of `fork_server`: imports a module, and forks processes that run its `main`.
 
 `python -m orchestration.foundation.processes.fork_server_process MODULE` serves until the other end of the
-socket that is its standard input is closed. With each byte come four file descriptors: the channel from which a new
-process reads its `ForkRequest` and on which its id and its exit code are answered, and its standard streams.
+socket that is its standard input is closed. With names of modules to import come four file descriptors: the channel
+from which a new process reads its `ForkRequest` and on which its id and its exit code are answered, and its standard
+streams.
 """
 
 import atexit
@@ -25,6 +26,8 @@ from orchestration.foundation.processes import channel as parent_channel
 from orchestration.foundation.processes.family import NamesInPlace
 from orchestration.foundation.processes.fork_server import ANSWER, LENGTH, ForkRequest, exactly
 
+_LONGEST = 4096
+"""Most bytes of names of modules"""
 _PR_SET_CHILD_SUBREAPER = 36
 """The number of the option in linux/prctl.h"""
 
@@ -32,11 +35,7 @@ _PR_SET_CHILD_SUBREAPER = 36
 def main(module: str, connection: socket.socket) -> ForkRequest | None:
     """Serve; returns its request in each forked process, and None in the server at its end."""
     names, own = NamesInPlace(), os.getpid()
-    gc.disable()  # takes a tenth of the time of importing
-    with contextlib.suppress(Exception):  # a forked process imports it again, and reports what is wrong
-        importlib.import_module(module)
-    gc.freeze()  # what garbage collection does not touch is not copied by a forked process
-    gc.enable()
+    _import([module])
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGCHLD, lambda *_: None)
     _adopt()
@@ -54,9 +53,10 @@ def main(module: str, connection: socket.socket) -> ForkRequest | None:
             _report(running)
         if connection.fileno() not in readable:
             continue
-        byte, descriptors, _, _ = socket.recv_fds(connection, 1, 4)
-        if not byte:
+        modules, descriptors, _, _ = socket.recv_fds(connection, _LONGEST, 4)  # up to the next descriptors
+        if not modules:
             return None
+        _import(modules.decode().split())
         channel, streams = socket.socket(fileno=descriptors[0]), descriptors[1:]
         try:
             pid = os.fork()
@@ -78,6 +78,16 @@ def main(module: str, connection: socket.socket) -> ForkRequest | None:
             running[pid] = channel
         for stream in streams:
             os.close(stream)
+
+
+def _import(modules: list[str]) -> None:
+    """Import modules, before a process is forked that needs them."""
+    gc.disable()  # takes a tenth of the time of importing
+    for name in modules:
+        with contextlib.suppress(Exception):  # a forked process imports it again, and reports what is wrong
+            importlib.import_module(name)
+    gc.freeze()  # what garbage collection does not touch is not copied by a forked process
+    gc.enable()
 
 
 def _report(running: dict[int, socket.socket]) -> None:

@@ -20,6 +20,8 @@ class Module:
 
     name: str
     arguments: tuple[str, ...]
+    loads: tuple[str, ...] = ()
+    """Modules that it will load"""
 
     @classmethod
     def of(cls, name: str, *arguments: object) -> "Module":

@@ -41,6 +41,7 @@ def main(what: str, *arguments: str) -> None:
                 "temporary": tempfile.gettempdir(),
                 "families": [each.decode() for each in shown if each.startswith(b"QUADCOSIM_FAMILY=")],
                 "interrupt": signal.getsignal(signal.SIGINT) is signal.SIG_IGN,  # `Parent` has set it so
+                "loaded": "colorsys" in sys.modules,
                 "open": sorted(os.listdir("/proc/self/fd")),
             }
         )

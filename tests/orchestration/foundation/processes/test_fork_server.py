@@ -51,6 +51,13 @@ def test_one_process_has_imported_the_module_for_all() -> None:
     assert first["process"] not in servers(MODULE)
 
 
+def test_what_a_process_will_load_is_loaded_before_it_is_forked() -> None:
+    assert not seen()["loaded"]
+    with Child(subprocesses.Module(MODULE, ("look",), loads=("there_is_none", "colorsys"))) as child:
+        assert child.receive()["loaded"]
+    assert seen()["loaded"]
+
+
 def test_a_variable_that_python_reads_when_it_starts_has_a_server_of_its_own() -> None:
     assert seen()["imported by"] != seen(PYTHONUTF8="1")["imported by"]
 

@@ -44,7 +44,7 @@ def test_a_loop_sampled_between_whole_nanoseconds_has_the_radius_of_its_neighbou
 
 
 def test_a_response_that_grows_until_it_cannot_be_followed_hides_no_poles() -> None:
-    """That to one input, over four times the period; not beside it: the radii at 0.3857 and 0.3858 s are those below."""
+    """That to one input, over four times the period; not beside it: radii at 0.3857 and 0.3858 s are those below."""
     assert 33.0031 < linearise({"timing": {"period": 0.385769231}}).radius < 33.0229
 
 
