@@ -138,6 +138,7 @@ def load_claim(path: Path) -> Claim:
     return claim
 
 
+@cache
 def load_claims() -> dict[str, Claim]:
     """All records by name."""
     return {path.stem: load_claim(path) for path in sorted(CLAIMS.glob("*.toml"))}

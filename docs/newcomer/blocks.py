@@ -74,7 +74,8 @@ class Block:
 def blocks_of(page: Path, root: Path) -> list[Block]:
     """The code blocks of a page in order; raises `ValueError` for a comment that matches no line."""
     found, notes = [], []
-    for token in MarkdownIt("commonmark").enable("table").parse((root / page).read_text(encoding="utf-8")):
+    parser = MarkdownIt("commonmark").enable("table").disable("inline")  # what is in lines is not looked at
+    for token in parser.parse((root / page).read_text(encoding="utf-8")):
         line = 1 + (token.map or [0])[0]
         if token.type == "html_block":
             notes += _notes(token.content, f"{page}:{line}")

@@ -108,7 +108,7 @@ def test_settling_times_of_the_page_are_those_of_the_maps() -> None:
         assert f"| {row} | {medians} |" in text
 
 
-@pytest.mark.parametrize("name", sample(FLOWN, 4))
+@pytest.mark.parametrize("name", sample(FLOWN, 2))
 def test_one_cell_in_a_hundred_is_what_is_flown_again(name: str) -> None:
     """The runs of `quadcosim compare studies/comparisons/NAME.toml --cell K`, here in lanes."""
     kept = comparisons.read_data(name)["cells"]

@@ -141,7 +141,7 @@ def test_any_other_gain_or_filter_than_that_of_lqg_costs_more(delay: float) -> N
         return found
 
     least = cost({})
-    for name, value in values.items():
+    for name, value in sample([*values.items()], 3):
         size = 0.01 * max(0.1, abs(value))
         beside = [cost({f"{lqg.PARAMETERS}.{name}": value + sign * size}) for sign in (1, -1)]
         assert least < min(beside) < max(beside) < 1.01 * least
