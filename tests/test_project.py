@@ -87,9 +87,10 @@ def test_the_quick_tests_exist() -> None:
     quick = re.search(r"^QUICK := (.*?)\n\n", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M | re.S)
     assert quick is not None
     groups = re.findall(r"addprefix ([\w/]+),([^)]*)\)", quick[1])
-    paths = [ROOT / prefix / name for prefix, names in groups for name in names.replace("\\", " ").split()]
-    assert len(paths) > 10
-    assert not [path for path in paths if not path.exists()]
+    named = [(prefix + name).partition("::") for prefix, names in groups for name in names.replace("\\", " ").split()]
+    assert len(named) > 10
+    assert not [path for path, _, _ in named if not (ROOT / path).exists()]
+    assert not [test for path, _, test in named if test and f"def {test}(" not in (ROOT / path).read_text("utf-8")]
 
 
 def test_every_python_from_the_oldest_on_is_tried() -> None:

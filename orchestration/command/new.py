@@ -12,7 +12,12 @@ from orchestration.foundation.basics.terminal import inform
 
 
 def new(
-    kind: Annotated[str, typer.Argument(help="What to write.", metavar="controller|plant|filter")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            help="A law for the quadrotor, a plant with its law, or a filter.", metavar="controller|plant|filter"
+        ),
+    ],
     name: Annotated[str, typer.Argument(help="Name of the folder and its FMU, such as hover_pd.")],
     author: Annotated[str | None, option("--author", "Author; default: git's user.name.")] = None,
     license: Annotated[str, option("--license", "Licence of the slave.", "TEXT")] = "",

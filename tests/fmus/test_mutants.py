@@ -129,7 +129,11 @@ def test_every_rule_has_a_mutant_that_it_finds(version: int, without: set[str]) 
     FMI 3.0 has other aliases, and in its FMUs is no Python, as for two rules.
     """
     names = {name_of(rule) for rule in (*rules.STANDARD, *rules.OURS)} | {READABLE, PROCESS, PLATFORM}
-    assert {mutant.rule_of(version) for of, mutant in OF_VERSIONS if of == version} == names - without
+    found = {mutant.rule_of(version) for of, mutant in OF_VERSIONS if of == version}
+    assert found == names - without, (
+        f"{', '.join(sorted(found ^ (names - without)))}: expected a mutant in MUTANTS of tests/fmus/mutants.py "
+        f"for each rule of orchestration/components/checks/validation/rules.py"
+    )
 
 
 @pytest.mark.parametrize("model", PAIR)
