@@ -55,6 +55,8 @@ class Certificate:
     memory: int
     """the number of future labels that a form depends on"""
     forms: Mapping[Node, Floats]
+    basis: Floats | None = None
+    """The state of `family` by that of its system; None: they are the same"""
 
     def to_json(self) -> str:
         """The file."""
@@ -75,6 +77,7 @@ class Certificate:
             "matrices": {name: matrix.tolist() for name, matrix in self.family.matrices.items()},
             "kept": self.family.kept,
             "letters": letters,
+            "basis": None if self.basis is None else self.basis.tolist(),
             "coordinates": self.coordinates.tolist(),
             "memory": self.memory,
             "forms": [{"mode": m, "word": w, "form": form.tolist()} for (m, w), form in self.forms.items()],
@@ -166,6 +169,7 @@ def _certificate(document: Mapping[str, Any]) -> Certificate:
         cells=tuple(cells),
         coordinates=_square(document["coordinates"], len(kept)),
         memory=_index(document["memory"]),
+        basis=None if document["basis"] is None else _square(document["basis"], size),
         forms=forms,
     )
 

@@ -65,6 +65,8 @@ def _family_for(certificate: Certificate, timeline: LoopTimeline, varying: list[
 def expect_same_family(certificate: Certificate, family: LoopFamily | None) -> None:
     """Raise `AnotherLoop` where a certificate is not of that family, within the radius that its proof covers."""
     own = certificate.family
+    if family is not None and certificate.basis is not None:
+        family = family.in_basis(certificate.basis) if family.accepts(certificate.basis) else None
     if family is None or (family.kept, family.letters) != (own.kept, own.letters):
         raise AnotherLoop("the events of a period of the system are not those of the certificate")
     if family.matrices.keys() != own.matrices.keys():

@@ -180,7 +180,11 @@ class Courses:
         """The family of letters with these products."""
         size = self._effects.places_count
         matrices = {"flow": self._flow} | {name: jump.matrix(size) for name, jump in self._jumps.items()}
-        return LoopFamily(matrices=matrices, kept=tuple(range(size)), letters=tuple(letters)).without_idle()
+        places, names = self._effects.places, self._effects.parts
+        states = tuple(tuple(range(size)[places("state", name)]) for name in names)
+        return LoopFamily(
+            matrices=matrices, kept=tuple(range(size)), letters=tuple(letters), states=states
+        ).without_idle()
 
     def same(self, one: Steps, other: Steps, point: Point) -> bool:
         """Whether two courses have the same effect at a point."""

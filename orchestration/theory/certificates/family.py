@@ -12,6 +12,9 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 
+MOST_CONDITION = 1e9
+"""Condition number of a basis from which on rounding may count"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Factor:
@@ -49,6 +52,13 @@ class LoopFamily:
     kept: tuple[int, ...]
     """the coordinates that matter from one period to the next; nothing depends on earlier values of the others"""
     letters: tuple[Letter, ...]
+    states: tuple[tuple[int, ...], ...] = ()
+    """the coordinates of each component's state: combinations of them describe it as well"""
+
+    @property
+    def size(self) -> int:
+        """The size of each matrix."""
+        return len(next(iter(self.matrices.values())))
 
     def largest(self) -> list[float]:
         """The largest value of each parameter, over all letters."""
@@ -58,8 +68,7 @@ class LoopFamily:
         """The map of a letter at values of its parameters, of the kept coordinates."""
         from scipy.linalg import expm
 
-        size = len(next(iter(self.matrices.values())))
-        total = np.eye(size)[:, self.kept]
+        total = np.eye(self.size)[:, self.kept]
         for factor in letter.product:
             matrix = self.matrices[factor.matrix]
             total = (matrix if factor.times is None else expm(matrix * factor.lasts(point))) @ total
@@ -82,4 +91,34 @@ class LoopFamily:
         while len(then) > len(used):
             used, then = then, np.union1d(then, np.flatnonzero(acts[then].any(axis=0)))
         matrices = {name: M[np.ix_(used, used)] for name, M in self.matrices.items()}
-        return replace(self, matrices=matrices, kept=tuple(np.searchsorted(used, self.kept).tolist()))
+        places = {int(place): i for i, place in enumerate(used)}
+        states = tuple(tuple(places[i] for i in state if i in places) for state in self.states)
+        return replace(self, matrices=matrices, kept=tuple(places[i] for i in self.kept), states=states)
+
+    def mixed(self) -> list[list[int]]:
+        """The kept coordinates of each component's state, which may be combined, and each other coordinate alone."""
+        own = [[i for i in state if i in self.kept] for state in self.states]
+        return [*filter(None, own), *([i] for i in range(self.size) if not any(i in each for each in own))]
+
+    def accepts(self, basis: Floats) -> bool:
+        """Whether a basis combines coordinates of a component's state only, and has an inverse well above rounding."""
+        if basis.shape != (self.size, self.size) or not np.linalg.cond(basis) < MOST_CONDITION:
+            return False
+        return not np.delete(basis.ravel(), [i * self.size + j for g in self.mixed() for i in g for j in g]).any()
+
+    def in_basis(self, basis: Floats) -> "LoopFamily":
+        """The family of the state basis · z, in which only coordinates of a component's state are combined.
+
+        What copies or ignores a value does so exactly.
+        """
+        back, groups, matrices = np.linalg.inv(basis), self.mixed(), dict[str, Floats]()
+        for name, M in self.matrices.items():
+            found = basis @ M @ back
+            for rows in groups:
+                for columns in groups:
+                    inside = np.ix_(rows, columns)
+                    copies = rows == columns and np.array_equal(M[inside], np.eye(len(rows)))
+                    if copies or not M[inside].any():
+                        found[inside] = M[inside]
+            matrices[name] = found
+        return replace(self, matrices=matrices)

@@ -39,12 +39,17 @@ class CertificateOnStep:
 
 def find_certificate(family: LoopFamily, of: Sequence[str], first: int = 0) -> CertificateOnStep | None:
     """A certificate that the checker accepts, from a step of the ladder on; None if none was found."""
-    parts = parts_of(family)
+    basis = _basis(family)
+    family = family.in_basis(basis)
+    parts, tried = parts_of(family), set[tuple[int, int]]()
     for step, (labels, memory) in enumerate(LADDER):
         if step < first:
             continue
+        if (least := (labels if any(x.ranges for x in family.letters) else 1, memory)) in tried:
+            continue
+        tried.add(least)
         certificate = Certificate(
-            of=tuple(of), radius=RADIUS, family=family, cells=tuple(_cells_of(family, labels, 1)),
+            of=tuple(of), radius=RADIUS, basis=basis, family=family, cells=tuple(_cells_of(family, labels, 1)),
             coordinates=_coordinates(family, parts), memory=memory, forms={},
         )  # fmt: skip
         if inequalities_of(certificate) > MAX_INEQUALITIES:
@@ -124,6 +129,21 @@ def _coordinates(family: LoopFamily, parts: Sequence[Sequence[int]]) -> Floats:
         inside = np.ix_(part, part)
         found[inside] = _norm_of([M[inside] for M in maps])
     return found
+
+
+def _basis(family: LoopFamily) -> Floats:
+    """The state in which each component's part of the norm above is the sum of squares.
+
+    In measured coordinates, as an output at successive samples, a radius of a millionth may be more than any proof has
+    room for: their numbers nearly cancel.
+    """
+    norm = _coordinates(family, parts_of(family))
+    squares, place = norm.T @ norm, {coordinate: i for i, coordinate in enumerate(family.kept)}
+    found = np.eye(family.size)
+    for group in (each for each in family.mixed() if len(each) > 1):
+        inside = [place[i] for i in group]
+        found[np.ix_(group, group)] = np.linalg.cholesky(squares[np.ix_(inside, inside)]).T
+    return found if family.accepts(found) else np.eye(family.size)
 
 
 def _norm_of(maps: Sequence[Floats]) -> Floats:

@@ -177,8 +177,26 @@ def _widened(M: arb_mat, by: arb_mat) -> arb_mat:
 
 
 def is_positive(Q: arb_mat) -> bool:
-    """Whether every symmetric matrix in `Q` is positive definite: its Cholesky factor exists, in intervals."""
-    rows, lower = Q.tolist(), list[list[arb]]()
+    """Whether every symmetric matrix in `Q` is positive definite.
+
+    Where |E| <= R, E + diag(Σ R_ij v_j / v_i) is positive semidefinite for any v > 0: so it suffices that the matrix of
+    the centres is, less that diagonal. In it only rounding is left, which its Cholesky factor survives; in intervals as
+    wide as those of `Q` it would lose most of the room that there is.
+    """
+    rows = Q.tolist()
+    if not all(rows[i][i] > 0 for i in range(len(rows))):
+        return False
+    v = [row[i].mid().sqrt().mid() for i, row in enumerate(rows)]
+    centres = [[x.mid() for x in row] for row in rows]
+    for i in range(len(rows)):
+        off = sum((rows[max(i, j)][min(i, j)].rad() * v[j] for j in range(len(rows))), arb(0))
+        centres[i][i] -= off / v[i]
+    return _has_cholesky_factor(centres)
+
+
+def _has_cholesky_factor(rows: list[list[arb]]) -> bool:
+    """Whether a symmetric matrix has a Cholesky factor, in intervals."""
+    lower = list[list[arb]]()
     for i, row in enumerate(rows):
         new: list[arb] = []
         for j in range(i):

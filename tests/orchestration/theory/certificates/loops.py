@@ -3,6 +3,7 @@
 from fractions import Fraction
 
 import numpy as np
+from scipy.linalg import expm, solve_discrete_are
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.component import Component, Sampling
@@ -11,7 +12,13 @@ from orchestration.systems.system.model import System
 from orchestration.theory.certificates.certificate import Cells, Certificate
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
-from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
+from orchestration.theory.stability.matrices import (
+    Components,
+    Continuous,
+    Matrices,
+    SampledSystem,
+    in_output_coordinates,
+)
 
 HOVER_A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 19.62, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0]])
 HOVER_B = np.array([[0.0], [0.0], [0.0], [1.0]])
@@ -88,3 +95,38 @@ def through_a_filter() -> CertifiedLoop:
     law = static("xy", "u", np.array([[0.8, 0.05]]))
     components: Components = {"plant": plant, "filter": static("pv", "xy", np.eye(2)), "law": law}
     return CertifiedLoop(system=system, components=components, period=Fraction(10**9))
+
+
+def cart_under_lqg() -> CertifiedLoop:
+    """A cart with a pendulum upright, at 10 ms under LQG of position and angle: in coordinates as measured, which are
+    outputs at samples one after the other and nearly equal.
+    """
+    T, M, m, length, g = 0.01, 0.5, 0.2, 0.3, 9.81
+    A, B, C = np.zeros((4, 4)), np.array([[0.0], [1.0 / M], [0.0], [-1.0 / (M * length)]]), np.eye(4)[[0, 2]]
+    A[0, 1] = A[2, 3] = 1.0
+    A[1, 2], A[3, 2] = -m * g / M, (M + m) * g / (M * length)
+    flow = expm(T * np.block([[A, B], [np.zeros((1, 5))]]))
+    F, G = flow[:4, :4], flow[:4, 4:]
+    S = solve_discrete_are(F, G, np.diag([10.0, 1.0, 10.0, 1.0]), np.eye(1))
+    K = np.linalg.solve(1.0 + G.T @ S @ G, G.T @ S @ F)
+    noise = 1e-5 * np.eye(2)
+    P = solve_discrete_are(F.T, C.T, 0.1 * G @ G.T + 1e-6 * np.eye(4), noise)
+    L = F @ P @ C.T @ np.linalg.inv(C @ P @ C.T + noise)
+    of_law = Matrices(inputs=("p", "a"), outputs=("u",), A=F - G @ K - L @ C, B=L, C=-K, D=np.zeros((1, 2)))
+    plant = Continuous(inputs=("u",), outputs=("p", "a"), A=A, B=B, C=C, D=np.zeros((2, 1)))
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.001),
+            "law": Component(fmu="law.fmu", sampling=Sampling(period=T)),
+        },
+        connections=(
+            Connection(name="measurement", start=("plant.p", "plant.a"), end=("law.p", "law.a")),
+            Connection(name="command", start=("law.u",), end=("plant.u",)),
+        ),
+    )
+    components: Components = {
+        "plant": in_output_coordinates(plant, expm(T * A)),
+        "law": SampledSystem(**vars(in_output_coordinates(of_law, of_law.A))),
+    }
+    return CertifiedLoop(system=system, components=components, period=Fraction(10**7))

@@ -12,19 +12,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import arb
+from flint import arb, arb_mat
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.theory.certificates import verify_certificate
 from orchestration.theory.certificates.breaking import least_breaking
 from orchestration.theory.certificates.certificate import Certificate, read_certificate
+from orchestration.theory.certificates.check_file import AnotherLoop, expect_same_family
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.find_certificate import find_certificate
-from orchestration.theory.certificates.verify_certificate import NotProven, verified
+from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.varying import LOSS, Varying
+from orchestration.theory.certificates.verify_certificate import NotProven, is_positive, verified
 from tests.orchestration.theory.certificates.loops import (
     HOVER_A,
     HOVER_B,
     HOVER_F,
+    cart_under_lqg,
     certificate_of,
     late_command,
     switched,
@@ -109,6 +113,31 @@ def test_what_is_said_is_made_of_the_numbers(hover: Certificate) -> None:
     assert verified(hover).ranges == {"late": ((0.0, 0.019),)}
     assert shrunk == (0.0, letter["edges"][0][-1])
     assert shrunk[1] < 0.019
+
+
+def test_positive_is_what_every_matrix_between_the_entries_is() -> None:
+    """1 on the diagonal and ±r beside it, 8 by 8: positive definite up to r = 1/7."""
+    for r, positive in ((0.142, True), (0.143, False)):
+        beside = [[arb(1) if i == j else arb(0, r) for j in range(8)] for i in range(8)]
+        assert is_positive(arb_mat(beside)) is positive
+
+
+def test_lqg_is_certified_in_a_state_that_leaves_the_radius_room() -> None:
+    lost = Varying(kind=LOSS, name="command", path="connections.command.loss")
+    family = LoopTimeline(cart_under_lqg(), [lost]).family(run=4)
+    found = find_certificate(family, [lost.path])
+    assert found is not None
+    proof = found.certificate
+    assert verified(proof).runs == {"arrives": None, "lost": 4}
+    assert proof.radius == 1e-6
+    again = _read(json.loads(proof.to_json()))
+    expect_same_family(again, family)
+    assert again.basis is not None
+    mixed = again.basis.copy()
+    mixed[0, -1] = 1.0  # a state of the plant with one of the law
+    for basis in (mixed, np.zeros_like(mixed), mixed[1:, 1:], None):
+        with pytest.raises(AnotherLoop):
+            expect_same_family(dataclasses.replace(again, basis=basis), family)
 
 
 def _read(document: Any) -> Certificate:
