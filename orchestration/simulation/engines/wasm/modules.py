@@ -1,4 +1,4 @@
-"""Compiles a system in C: to a WebAssembly module for a page, or to a library of this machine, which tests call."""
+"""Compiles a system in C to the WebAssembly module of a page."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fmu_kit import libraries
 from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Unit, linked_for_wasm, linked_here
+from fmu_kit.compiler.pack.c_compiler import Unit, linked_for_wasm
 from fmu_kit.compiler.pack.lanes import MAIN
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
@@ -79,23 +79,15 @@ def _specialised(code: str, fixed: Mapping[str, float]) -> str:
 
 def module_of(tables: SystemTables, lanes: int) -> bytes:
     """The WebAssembly module of a system for a number of SIMD lanes; raises `QuadcosimError` without its compiler."""
-    return _cached("wasm", tables, lanes, ("-msimd128",) if lanes > 1 else ()).read_bytes()
-
-
-def library_of(tables: SystemTables, lanes: int) -> Path:
-    """The same as a library of this machine; raises `QuadcosimError` without a compiler."""
-    return _cached("live", tables, lanes, (*FOR_THIS_PROCESSOR, "-Wno-psabi"))
-
-
-def _cached(kind: str, tables: SystemTables, lanes: int, options: Sequence[str]) -> Path:
-    units = units_of(tables, lanes)
-    sources: Mapping[str, bytes] = {
-        f"{i}/{name}": text for i, u in enumerate(units) for name, text in u.sources.items()
-    }
-    linked = linked_for_wasm if kind == "wasm" else linked_here
+    units, options = units_of(tables, lanes), ("-msimd128",) if lanes > 1 else ()
+    what = ("wasm", lanes, options, tuple(u.options for u in units))
     try:
-        return libraries.cached_library(
-            kind, dict(sources), (kind, lanes, options, tuple(u.options for u in units)), lambda: linked(units, options)
-        )
+        library = libraries.cached_library("wasm", sources_in(units), what, lambda: linked_for_wasm(units, options))
     except (PackagingError, OSError) as error:
         raise QuadcosimError(str(error)) from error
+    return library.read_bytes()
+
+
+def sources_in(units: Sequence[Unit]) -> dict[str, bytes]:
+    """The sources of what is compiled, by the number of the unit and their name."""
+    return {f"{i}/{name}": text for i, unit in enumerate(units) for name, text in unit.sources.items()}

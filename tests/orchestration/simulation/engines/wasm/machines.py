@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from fmu_kit import libraries
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, linked_here
 from orchestration.components.fmi.read_description import read_model
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus
-from orchestration.simulation.engines.wasm.tables_of_system import tables_of
+from orchestration.simulation.engines.wasm.modules import sources_in, units_of
+from orchestration.simulation.engines.wasm.tables_of_system import SystemTables, tables_of
 from orchestration.simulation.requests.request import request_of
 from orchestration.simulation.runs.many_runs import located
 from orchestration.systems.system.check import connect_references
@@ -28,6 +31,13 @@ def tables(request, lanes):
     models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
     system = check_against_fmus(connect_references(system, models), models).system
     return tables_of(Shape(system=system, models=models, lanes=lanes))
+
+
+def library_of(tables: SystemTables) -> Path:
+    """The module of one lane as a library of this machine."""
+    units, options = units_of(tables, 1), (*FOR_THIS_PROCESSOR, "-Wno-psabi")
+    what = ("live", options, tuple(unit.options for unit in units))
+    return libraries.cached_library("live", sources_in(units), what, lambda: linked_here(units, options))
 
 
 def decimal_of(value: float) -> tuple[int, int]:

@@ -6,11 +6,10 @@ import pytest
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.wasm import modules
-from orchestration.simulation.engines.wasm.modules import library_of
 from orchestration.simulation.engines.wasm.tables_of_system import tables_of
 from orchestration.simulation.requests.request import request_of
 from quadcosim import ReferenceChoice, Scenario, fly
-from tests.orchestration.simulation.engines.wasm.machines import Native, Page, hashes_of, tables
+from tests.orchestration.simulation.engines.wasm.machines import Native, Page, hashes_of, library_of, tables
 from tests.places import ROOT
 
 COLUMNS = ("plant.position.x", "plant.position.z", "plant.quaternion.w", "plant.thrust", "controller.torque.y")
@@ -64,7 +63,7 @@ def requests():
 def page_of(of):
     """The page of these tables, as a library of this machine."""
     settings = {setting.path: setting.value for setting in of.settings.all}
-    return Page(Native(library_of(of, 1)), settings, of.shape.place, [*of.shape.nodes])
+    return Page(Native(library_of(of)), settings, of.shape.place, [*of.shape.nodes])
 
 
 def hashes(page, runs):
