@@ -5,12 +5,14 @@ from typing import Annotated
 
 import typer
 
+from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
-from orchestration.command.registry import CommandResult
+from orchestration.command.registry import CommandResult, option_group
 from orchestration.foundation.basics.terminal import in_columns, inform, inform_in_passing
 
 
+@option_group("look", FigureFlags)
 @flight_options
 def limit(
     scenario: ScenarioFile = None,
@@ -60,6 +62,7 @@ def limit(
     figures: Annotated[bool, typer.Option(help="Draw the measurements with both limits.")] = True,
     *,
     flags: FlightFlags,
+    look: FigureFlags,
 ) -> CommandResult:
     """Find the largest good value of a period, delay, jitter, loss or any path by runs, and the local limit."""
     from orchestration.experiments.limits import limit as limits
@@ -75,7 +78,7 @@ def limit(
     if figures and where is not None:
         from orchestration.experiments.limits.figure import draw_limit
 
-        for written in draw_limit(request, found, where):
+        for written in draw_limit(request, found, where, look.figure_style):
             inform(str(written))
     texts = limits.as_text(found)
     width = max(map(len, texts))

@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +40,9 @@ def limit_figure(result: Limit, style: Style = SCREEN) -> Figure:
     axes.set_xlim(_with_margin([one.value * across.factor for one in result.tried]))
     _draw_limits(axes, result, across)
     axes.set_xlabel(across.title)
-    axes.set_title(_title(result, across), loc="left")
-    figure.legend(loc="outside lower center", ncols=3)
+    if style.has_titles:
+        axes.set_title(_title(result, across), loc="left")
+    figure.legend(loc="outside lower center", ncols=3 if style.is_wide else 1)
     return figure
 
 
@@ -75,10 +77,18 @@ def _draw_values(axes: Axes, result: Limit, across: Quantity) -> None:
 
 
 def _draw_shares(axes: Axes, result: Limit, across: Quantity) -> None:
-    """Many runs per value: the share of good seeds, with its interval where all were run."""
-    shares = [one.flew / one.runs for one in result.tried]
-    _draw_marks(axes, result.tried, shares, across)
+    """Many runs per value: the share of good seeds with its interval, or the possible ones where not all were run."""
     known = [one for one in result.tried if one.share is not None]
+    _draw_marks(axes, known, [one.flew / one.runs for one in known], across)
+    stopped = [one for one in result.tried if one.share is None]
+    axes.vlines(
+        [one.value * across.factor for one in stopped],
+        [one.flew / result.seeds for one in stopped],
+        [1.0 - (one.runs - one.flew) / result.seeds for one in stopped],
+        color=RED,
+        linestyle=":",
+        label="possible, not all seeds run" if stopped else "",
+    )
     low, high = (np.array([one.share[side] for one in known if one.share is not None]) for side in (0, 1))
     middle = np.array([one.flew / one.runs for one in known])
     apart = np.maximum(np.array([middle - low, high - middle]), 0.0)
@@ -90,9 +100,7 @@ def _draw_shares(axes: Axes, result: Limit, across: Quantity) -> None:
     axes.set(ylabel=f"share of {result.seeds} seeds that are good", ylim=(-0.05, 1.08))
 
 
-def _draw_marks(
-    axes: Axes, tried: "list[Evaluation] | tuple[Evaluation, ...]", heights: list[float], across: Quantity
-) -> None:
+def _draw_marks(axes: Axes, tried: Sequence[Evaluation], heights: list[float], across: Quantity) -> None:
     """One mark per value: dots where all runs were good, crosses elsewhere."""
     for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
         chosen = [i for i, one in enumerate(tried) if one.is_good is good]
@@ -131,7 +139,7 @@ def _title(result: Limit, across: Quantity) -> str:
         return f"Good {' '.join(filter(None, between))}: {what}{until}"
     first = result.tried[0]
     if first.is_good:
-        return f"{what}: good throughout the scan{until}"
+        return f"{what}: good throughout{until}"
     return f"{what}: not good at {across.text_of(first.value, DIGITS)}, where the scan begins{until}"
 
 

@@ -75,8 +75,9 @@ def find(
     units, metric = checks[0].units, judged_objective(varied.system)
     random = varied.at(span.last).depends_on_seed
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
-    local = _by_theory("local", files, local_limits, varied, span)
-    mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
+    with share_reporter(progress, "limits by linear theory"):  # without shares, as it ends where the limit is
+        local = _by_theory("local", files, local_limits, varied, span)
+        mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
     with share_reporter(progress, "longest search") as report, RunEvaluator(files, workers, execution.engine) as pool:
         announce = announce or (lambda line: None)
         if engine == "auto":

@@ -367,6 +367,8 @@ def test_a_limit_of_many_seeds_shows_their_share_with_its_interval() -> None:
         Evaluation(value=v, outcome="settled", divergence_time=None, flew=n, runs=29, share=wilson(n, 29, 0.95))
         for v, n in ((0.1, 29), (0.2, 20))
     )
+    stopped = Evaluation(value=0.15, outcome="bounded", divergence_time=None, flew=10, runs=11, share=None)
+    tried = (tried[0], stopped, tried[1])
     figure = limit_figure.limit_figure(limit("loss", unit=None, confidence=0.95, seeds=29, tried=tried))
     (axes,) = figure.axes
     marks = {line.get_label(): line for line in axes.get_lines()}
