@@ -178,7 +178,10 @@ def fronts_of(
         figure.legend(handles=handles, loc="outside right center")
     else:
         figure.legend(handles=handles, loc="outside lower center", ncols=abreast([*colors], style))
-    figure.supxlabel(metrics[0])
+    if style.is_wide:
+        figure.supxlabel(metrics[0])
+    else:  # that of the figure would lie on the legend
+        panels[-1].set_xlabel(metrics[0])
     figure.supylabel(metrics[1])
     count = len({point.value for point in points})
     some = f"{len(values)} of {count} values; " if len(values) < count else ""

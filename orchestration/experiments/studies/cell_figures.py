@@ -86,7 +86,7 @@ def cell_maps(
     count = 3 if len(groups) == 2 else len(groups)
     columns = min(count, 3 if style.is_wide else 1)
     rows = -(-count // columns)
-    figure = style.figure((24.0 if columns > 1 else 32.0) * rows + 6.0)
+    figure = style.figure(32.0 * rows + 6.0 if count == 1 else (24.0 if columns > 1 else 17.0) * rows + 6.0)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel in panels[count:]:
         panel.set_visible(False)
@@ -194,7 +194,7 @@ def _difference(
     size = 1.0 if metric == GOOD or not known.max(initial=0.0) else float(known.max())
     filled = mesh.fill(panel, *places, difference, cmap="RdBu", norm=Normalize(-size, size), vmin=None)
     of = "difference of the shares" if metric == GOOD else "difference of the medians"
-    figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0)
+    figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85)
     panel.set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     if metric != GOOD:
         return

@@ -35,6 +35,8 @@ def heat_map(
 ) -> Figure:
     """A metric where runs are good, the outcome elsewhere, and the limit between the two; missing runs are hatched.
 
+    If none is good, it is the metric of those that have not diverged.
+
     The legend lists the outcomes that occur.
     """
     kinds = {words[0]: 0, words[1]: 1, TERMINATED: 1, DIVERGED: 2}
@@ -46,19 +48,25 @@ def heat_map(
     figure = style.figure(36.0)
     panel = figure.add_subplot()
     cells.fill_kinds(panel, x, y, np.where(kind > 0.0, kind - 1.0, np.nan), (NOT_GOOD, DARK))
-    shown = np.where(good > 0.5, values, np.nan)
+    valued = 0 if (good > 0.5).any() else 1
+    shown = np.where(kind == valued, values, np.nan)
     mesh = cells.fill(panel, x, y, shown)
     cells.hatch(panel, x, y, np.isnan(kind))
     has_limit = cells.limit(panel, x, y, good) is not None
     panel.set(xlabel=across.title, ylabel=up.title, xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
     cells.name_cells(panel, *(each.of(np.unique(coded[axis.name])) for axis, each in zip(axes, (across, up))))
     named = labels.metric_with_unit(metric, units.get(metric))
-    cells.color_bar(panel, mesh, shown, f"{named}, where {words[0]}")
+    cells.color_bar(panel, mesh, shown, f"{named}, where {words[valued]}")
     outcomes = {*table["outcome"].dropna()}
     bad = " or ".join(word for word in (words[1], TERMINATED) if word in outcomes)
+    shade = matplotlib.colormaps[SHADES](0.5)
     handles: list[Patch | Line2D] = [
         Patch(color=color, label=word)
-        for word, color in ((words[0], matplotlib.colormaps[SHADES](0.5)), (bad, NOT_GOOD), (DIVERGED, DARK))
+        for word, color in (
+            (words[0], shade),
+            (bad, shade if valued and np.isfinite(shown).any() else NOT_GOOD),
+            (DIVERGED, DARK),
+        )
         if word and (word == bad or word in outcomes)
     ]
     handles += [cells.hatched()] if np.isnan(kind).any() else []

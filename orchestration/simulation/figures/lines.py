@@ -71,19 +71,20 @@ def set_span(axes: Axes, span: Window) -> None:
         axes.set_xlim(span)
 
 
-def legend_of_runs(figure: Figure, runs: Sequence[DrawnRun], style: Style) -> None:
-    """A legend of the runs above all panels; none for one run."""
+def legend_of_runs(figure: Figure, runs: Sequence[DrawnRun], style: Style, of: str | None = None) -> None:
+    """A legend of the runs above all panels, with a title of its own; none for one run."""
     if len(runs) > 1:
         handles = [Line2D([], [], color=run.color, linestyle=run.dashes, label=run.name) for run in runs]
         columns = abreast([run.name for run in runs], style)
-        figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+        figure.legend(handles=handles, loc="outside upper center", ncols=columns, title=of)
 
 
 def name_runs(figure: Figure, runs: Sequence[DrawnRun], style: Style) -> None:
     """Their common title above the figure, if the style has titles, and a legend of several runs."""
-    if style.has_titles and (common := title(runs)):
+    common = title(runs) if style.has_titles else None
+    if common and len(runs) == 1:
         figure.suptitle(common)
-    legend_of_runs(figure, runs, style)
+    legend_of_runs(figure, runs, style, common)  # a title above both would lie on the legend
 
 
 def abreast(names: Sequence[str], style: Style, *, width: float = 1.0) -> int:

@@ -1,6 +1,7 @@
 """Pictures of a comparison, of cells made up."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,7 +10,8 @@ from orchestration.experiments.comparison.cells import CellSummary, Median, Shar
 from orchestration.experiments.comparison.figures import Reach, colors_of, fronts_of, limits_of, shares
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
-from orchestration.simulation.figures.style import SCREEN
+from orchestration.simulation.figures.names import COLUMNS
+from orchestration.simulation.figures.style import SCREEN, STYLES
 from orchestration.simulation.results.quantities import Quantity
 
 SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20), "nor this": (20, 20, 20)}
@@ -86,6 +88,10 @@ def test_a_point_far_beyond_the_others_is_told_in_words_and_those_left_out_are_c
     ), "room for the words"
     assert calm.get_title().endswith("9 starts,\n3 of 4 controllers")
     assert "2 of 3 values" in figure.get_suptitle()
+    narrow = replace(STYLES["paper"], width=COLUMNS["single"])
+    axis = Quantity(name="period", unit="s")
+    figure = fronts_of(points, (0.01, 0.02), axis, ("effort", "error"), colors, "body", narrow)
+    assert (figure.get_supxlabel(), figure.axes[-1].get_xlabel()) == ("", "effort"), "the legend is below it"
 
 
 def at(value: float) -> Median:

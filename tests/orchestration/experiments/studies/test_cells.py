@@ -142,13 +142,22 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     )
 
 
-def test_a_map_for_a_column_of_a_journal_is_a_page_high_and_no_text_is_wider_than_it() -> None:
+def test_the_numbers_of_two_colour_bars_side_by_side_do_not_touch() -> None:
+    style = STYLES["paper"]
+    with style.applied():
+        figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=style)
+        figure.draw_without_rendering()
+        shares, difference = (bar.get_xticklabels() for bar in figure.axes[3:])
+        assert shares[-1].get_window_extent().x1 + style.font < difference[0].get_window_extent().x0
+
+
+def test_a_map_for_a_column_of_a_journal_leaves_room_on_a_page_and_no_text_is_wider_than_it() -> None:
     style = replace(STYLES["paper"], width=COLUMNS["single"])
     with style.applied():
         figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=style)
         figure.draw_without_rendering()
         wide, high = figure.bbox.size
-        assert high < style.dpi * PAGE / INCH + 1.0
+        assert high < 0.75 * style.dpi * PAGE / INCH
         texts = [*figure.findobj(Text)]
         assert all(box.x0 >= 0.0 and box.x1 <= wide for box in (text.get_window_extent() for text in texts))
         assert [*figure.axes[0].get_yticks()] == [0.0, 0.1, 0.2]

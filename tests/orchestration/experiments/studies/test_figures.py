@@ -250,6 +250,15 @@ def test_a_map_distinguishes_bounded_from_diverged_and_shows_the_horizon() -> No
     assert told_of(figure) == ["settled", "bounded", "diverged", "missing", "limit of what is settled, by 30 s"]
 
 
+def test_a_map_without_a_good_run_has_the_metric_of_those_that_have_not_diverged() -> None:
+    runs = pd.concat([table().assign(**{"timing.delay": delay}) for delay in (0.0, 0.01)])
+    runs["outcome"] = ["bounded", "bounded", "diverged", "bounded", "bounded"] * 2
+    axes = (axis("timing.period", 0.01), axis("timing.delay", 0.01))
+    figure = heat_map(judged(runs), axes, "ultimate_bound", WORDS, units={"ultimate_bound": "m"})
+    assert figure.axes[1].get_ylabel() == "largest position error, last third [m], where bounded"
+    assert told_of(figure) == ["bounded", "diverged"]
+
+
 def told_of(figure: matplotlib.figure.Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 

@@ -1,9 +1,14 @@
 """Lines of long runs have few points, and the picture of all rows."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from orchestration.simulation.figures.lines import visible_rows
+from orchestration.simulation.figures import lines
+from orchestration.simulation.figures.lines import name_runs, visible_rows
+from orchestration.simulation.figures.style import SCREEN
 
 COLUMNS, ROWS = 100, 20_000
 
@@ -27,3 +32,13 @@ def test_a_column_of_pixels_has_the_first_last_lowest_and_highest_of_its_rows_an
 
 def test_a_short_line_has_all_its_rows() -> None:
     assert visible_rows(np.arange(9.0), np.zeros(9), 3).tolist() == [*range(9)]
+
+
+def test_the_title_of_several_runs_is_that_of_their_legend(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lines, "title", lambda runs: "common")
+    runs: list[Any] = [SimpleNamespace(name=name, color="k", dashes="-") for name in ("one", "two")]
+    for shown, above, legends in ((runs[:1], "common", []), (runs, "", ["common"])):
+        figure = SCREEN.figure(20.0)
+        name_runs(figure, shown, SCREEN)
+        assert figure.get_suptitle() == above
+        assert [legend.get_title().get_text() for legend in figure.legends] == legends
