@@ -153,11 +153,11 @@ def _shared_of(part: str, shared: Mapping[str, Any], hashes: Mapping[str, str]) 
 
 def _values_of(of: Any) -> dict[str, Any]:
     values = {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
-    return {name: value for name, value in values.items() if name not in _LATER or value is not None}
+    return {name: value for name, value in values.items() if name not in _LATER or value not in (None, ())}
 
 
-_LATER = ("interface", "partition", "instance", "solver", "fmu_clock", "start_time", "outside")
-"""Keys without which rows were stored before there were any; those rows are still found"""
+_LATER = ("interface", "partition", "instance", "solver", "fmu_clock", "start_time", "outside", "points")
+"""Keys without which studies were stored before there were any, as they are still if these are not set"""
 
 
 def _content(of: Any, hashes: Mapping[str, str]) -> dict[str, Any]:
@@ -206,7 +206,7 @@ def _parts(place: str, of: Any, hashes: Mapping[str, str], without: Container[st
             parts |= _parts(path, value, hashes)
         elif field.name == "parameters":
             parts |= {f"{path}.{name}": parameter for name, parameter in value.items()}
-        elif value is not None and field.name not in without:
+        elif value is not None and field.name not in without and (field.name not in _LATER or value != ()):
             parts[path] = _plain(value, hashes)
     return parts
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.experiments.studies.run_key import difference
+from orchestration.experiments.studies.run_key import difference, study_parts
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
@@ -124,6 +124,10 @@ def test_files_on_an_axis_are_the_same_from_every_folder(tmp_path: Path, monkeyp
         axes.append(load_study(path).axes)
     assert axes[0] == axes[1]
     assert axes[0][0].values == (str(tmp_path / "one.fmu"), "UnifiedController")
+
+
+def test_a_study_has_no_parts_that_are_not_set_so_that_older_stores_of_it_are_drawn(tmp_path: Path) -> None:
+    assert [name for name in study_parts(load(tmp_path, ONE)) if name.endswith(".points")] == []
 
 
 def test_a_difference_of_long_texts_shows_where_they_differ() -> None:
