@@ -1,6 +1,7 @@
 """The commands that draw a loop: over the frequency, after a step, and its poles over a quantity."""
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,7 +42,8 @@ def bode(
         rows.append(
             (
                 loop.output,
-                ", ".join(f"{one.factor:.4g}" for one in loop.gain_margins) or "infinite",
+                ", ".join(f"{one.factor:.4g} ({20.0 * math.log10(one.factor):.3g} dB)" for one in loop.gain_margins)
+                or "infinite",
                 "infinite" if phase is None else f"{phase:.4g}°",
                 "not known" if loop.delay_reason else "infinite" if delay is None else quantity(delay, "s"),
                 "-" if crossover is None else f"{crossover:.4g} rad/s",

@@ -85,8 +85,9 @@ def search_range(
     last: float | None,
     tolerance: float | None,
     scan: float | None,
+    share: float = 1.0,
 ) -> Range:
-    """The range in which a limit is searched; raises `UsageError` for an invalid one.
+    """The range in which a limit is searched, by default a `share` of it; raises `UsageError` for an invalid one.
 
     Without `first` it contains the value of the system itself, from which the search goes up and down.
     """
@@ -101,7 +102,7 @@ def search_range(
     if known is None and (first is None or last is None):
         raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is searched")
     low = first if first is not None else known.first if known is not None else 0.0
-    high = last if last is not None else known.last if known is not None else 0.0
+    high = last if last is not None else low + share * (known.last - low) if known is not None else 0.0
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
     if known is not None and named is None and (first is None or last is None):

@@ -15,6 +15,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.terminal import progress_bar, warn
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.system.distribution import lowest
@@ -110,10 +111,15 @@ class Bode:
     """The largest of the loops' peaks; None: the loop is unstable."""
     loops: tuple[LoopMargins, ...]
     """The loops with their margins; empty if the loop is unstable."""
+    outputs: tuple[str, ...]
+    """The commands, one for each loop, as COMPONENT.VARIABLE; also of an unstable loop."""
     frequencies: Floats = field(repr=False)
     """Frequencies up to half the sampling rate [rad/s], shape (n,)."""
     gains: Complexes = field(repr=False)
     """Loop gains L at them, which negative feedback closes, shape (loops, n)."""
+
+    def __repr__(self) -> str:
+        return f"<Bode: {self.verdict}>"
 
     @property
     def verdict(self) -> str:
@@ -161,7 +167,23 @@ def bode(request: RequestLike, component: str | None = None) -> Bode:
 
     Raises `UsageError` as `linearise`, and for a loop whose stability rounding may decide.
     """
+    for one, other, interval in stepped_couplings(system_of(request_of(request))):
+        warn(
+            f"{one} and {other} run in continuous time, and exchange every {quantity(interval, 's')}: the loop is that "
+            "of this stepped coupling; with shorter steps the margins may differ"
+        )
     return in_isolation(request, _bode, component)
+
+
+def stepped_couplings(system: System) -> list[tuple[str, str, float]]:
+    """Pairs of components in continuous time that are connected, with the longer one of their steps [s]."""
+    steps = {name: one.step for name, one in system.components.items() if one.sampling is None and one.step is not None}
+    pairs = dict.fromkeys((x.sender, x.receiver) for x in system.connections)
+    return [
+        (one, other, max(steps[one], steps[other]))
+        for one, other in pairs
+        if one in steps and other in steps and not ((other, one) in pairs and other < one)
+    ]
 
 
 def expect_decided(loop: Linearised) -> None:
@@ -199,10 +221,14 @@ def _bode(request: Request, component: str | None) -> Bode:
                 curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
                 gains = np.array([curve for curve, _ in curves])
                 each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
-            found = tuple(each) if stable else ()
+            found = list[LoopMargins]()
+            with progress_bar("margins") as report:
+                for margins in each if stable else ():
+                    found.append(margins)
+                    report(len(found) / len(gains))
     return Bode(
-        dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=found,
-        frequencies=frequencies, gains=gains,
+        dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=tuple(found),
+        outputs=tuple(_output(loop, i) for i in _commands(loop)), frequencies=frequencies, gains=gains,
         sensitivity_peak=max((each.sensitivity_peak for each in found), default=None),
     )  # fmt: skip
 
@@ -225,12 +251,16 @@ def _commands(loop: Linearised) -> range:
     return range(len(loop.component.outputs) // loop.samples)
 
 
+def _output(loop: Linearised, i: int) -> str:
+    return f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}"
+
+
 def _lifted_margins(
     loop: Linearised, i: int, frequencies: Floats, gain: Complexes, peak: float, late: Late,
     system: System,
 ) -> LoopMargins:  # fmt: skip
     """The margins of a command at all of its samples in a period."""
-    output = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}"
+    output = _output(loop, i)
     turn, crossover = phase_margin(loop, i) or (None, None)
     factors = tuple(GainMargin(factor=factor, frequency=at) for factor, at in gain_margins(loop, i))
     crossings = np.flatnonzero(np.diff(np.sign(np.abs(gain) - 1.0)))
@@ -255,7 +285,7 @@ def _margins(loop: Linearised, i: int, frequencies: Floats, gain: Complexes, lat
     def gain_at(frequency: float) -> complex:
         return complex(loop_gains(loop, np.array([frequency]))[i, 0])
 
-    output = f"{loop.name}.{loop.component.outputs[i]}"
+    output = _output(loop, i)
     gain_margins = tuple(_gain_margins(loop, i, frequencies, gain, gain_at))
     crossings = [root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in sign_changes(frequencies, np.abs(gain) - 1.0)]
     phases = {w: _phase_margin(gain_at(w)) for w in crossings}

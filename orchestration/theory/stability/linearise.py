@@ -60,6 +60,9 @@ class Linearised:
     poles: tuple[Pole, ...]
     """The poles of the whole loop, as `radius`, the slowest first, without those at 0."""
 
+    def __repr__(self) -> str:
+        return f"<Linearised: {self.verdict}>"
+
     @property
     def verdict(self) -> str:
         """Whether the linear loop is stable, and its sizes."""

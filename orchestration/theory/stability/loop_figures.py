@@ -1,6 +1,7 @@
 """Figures of loops: over the frequency, after a step, and their poles over a quantity."""
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,34 +21,46 @@ from orchestration.theory.stability.step_response import Step
 
 SHOWN = 1.4
 """Largest part of a pole that is drawn"""
+NEAR, MOST = 2.0, 0.4
+"""Half the width of the panel about 1, in distances of the slower half of the poles from it, and at most"""
+HIGHEST = 2.0
+"""Largest spectral radius that is drawn"""
+LEAST = 1e-12
+"""Least gain that is drawn"""
 
 
 def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     """The gain of each loop, its phase, and its sensitivity; lines are gain and phase margins, at their crossovers."""
     figure = style.figure(66.0)
     above, middle, below = figure.subplots(3, sharex=True)
-    above.set_yscale("log")
-    below.set_yscale("log")
-    for i, (gain, loop) in enumerate(zip(result.gains, result.loops, strict=False)):
+    several = len(result.outputs) > 1
+    for i, (gain, output) in enumerate(zip(result.gains, result.outputs, strict=True)):
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
-        phase = _phase(gain)
-        name = signal(loop.output, {})
-        label = f"{name}: {_sizes(loop)}" if len(result.loops) > 1 else name
-        above.plot(result.frequencies, np.abs(gain), label=label, **how)
+        phase, loop = _phase(gain), result.loops[i] if result.stable else None
+        name = signal(output, {})
+        label = f"{name}: {_sizes(loop)}" if several and loop is not None else name
+        above.plot(result.frequencies, _decibels(np.abs(gain)), label=label, **how)
         middle.plot(result.frequencies, phase, **how)
-        below.plot(result.frequencies, np.abs(1.0 / (1.0 + gain)), **how)
-        _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=len(result.loops) == 1)
+        below.plot(result.frequencies, _decibels(np.abs(1.0 / (1.0 + gain))), **how)
+        if loop is not None:
+            _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=not several)
+    if not result.stable:
+        above.set_title("closed, the loop is unstable: it has no margins")
     for axes in (above, below):
-        axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
+        axes.axhline(0.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.axhline(-180.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.yaxis.set_major_locator(MultipleLocator(90.0))
-    above.set(ylabel="loop gain |L|", xscale="log")
+    above.set(ylabel="loop gain |L| [dB]", xscale="log")
     middle.set(ylabel="phase of L [°]")
-    below.set(ylabel="sensitivity |1 / (1 + L)|", xlabel="frequency [rad/s], up to half the sampling rate")
+    below.set(ylabel="sensitivity |1 / (1 + L)| [dB]", xlabel="frequency [rad/s], up to half the sampling rate")
     below.set_xlim(result.frequencies[0], result.frequencies[-1])
     figure.legend(loc="outside lower center", ncols=2)
     return figure
+
+
+def _decibels(gain: Floats) -> Floats:
+    return np.asarray(20.0 * np.log10(np.maximum(gain, LEAST)))
 
 
 def _sizes(loop: LoopMargins) -> str:
@@ -62,21 +75,27 @@ def _mark_margins(
     """The margins as lines at their crossovers, from where they would be none, with their sizes beside the middle."""
     above, middle = panels
     lines = [
-        (above, max(one.frequency, frequencies[0]), 1.0, 1.0 / one.factor, f"× {one.factor:.3g}")
+        (above, max(one.frequency, frequencies[0]), 0.0, -decibels, f"× {one.factor:.3g} ({decibels:.3g} dB)")
         for one in loop.gain_margins
+        for decibels in [20.0 * math.log10(one.factor)]
     ]
     if loop.crossover is not None and loop.phase_margin is not None:
-        above.plot(loop.crossover, 1.0, "o", color=color)
+        above.plot(loop.crossover, 0.0, "o", color=color)
         reached = float(np.interp(loop.crossover, frequencies, phase))
         lines.append((middle, loop.crossover, reached - loop.phase_margin, reached, f"{loop.phase_margin:.3g}°"))
     for axes, at, none, end, size in lines:
         axes.plot([at, at], [none, end], color=color, linewidth=2.0, clip_on=False)
-        place = math.sqrt(none * end) if axes is above else 0.5 * (none + end)
-        if labelled:
+        if not labelled:
+            continue
+        beside: dict[str, Any]
+        if axes is above:  # where a gain falls there is room below it to the left, and above it to the right
+            beside = {"xytext": (-5.0, 0.0), "ha": "right"} if end > none else {"xytext": (5.0, 0.0)}
             axes.annotate(
-                size, (at, place), xytext=(4.0, 0.0), textcoords="offset points", verticalalignment="center",
-                color=color,
-            )  # fmt: skip
+                size, (at, 0.5 * (none + end)), textcoords="offset points", va="center", color=color, **beside
+            )
+        else:
+            beside = {"xytext": (0.0, -3.0), "va": "top"} if end > none else {"xytext": (0.0, 3.0)}
+            axes.annotate(size, (at, none), textcoords="offset points", ha="center", color=color, **beside)
 
 
 def _phase(gain: Complexes) -> Floats:
@@ -104,29 +123,36 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
 def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     """The poles beside the unit circle, shaded by the quantity, and the spectral radius over it; crosses leave it."""
     across = setting(result.of if "." in result.of else f"timing.{result.of}", result.values, result.unit)
-    figure = style.figure(36.0 if style.is_wide else 80.0)
-    plane, over = figure.subplots(1, 2) if style.is_wide else figure.subplots(2, 1)
+    figure = style.figure(54.0 if style.is_wide else 120.0)
+    rows = [["plane", "close"], ["over", "over"]] if style.is_wide else [["plane"], ["close"], ["over"]]
+    panels: dict[str, Axes] = figure.subplot_mosaic(rows, height_ratios=[2.0] * (len(rows) - 1) + [1.0])
+    plane, close, over = panels["plane"], panels["close"], panels["over"]
     values = across.of(result.values)
-    plane.axhline(0.0, color=GREY, linewidth=0.5)
-    plane.axvline(0.0, color=GREY, linewidth=0.5)
-    plane.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=BLACK, linewidth=1.0))
     is_there = np.isfinite(result.poles) & (np.abs(result.poles) < 2.0 * SHOWN)
     poles = result.poles[is_there]
     shade = np.broadcast_to(values[:, None], result.poles.shape)[is_there]
-    dots = plane.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
-    figure.colorbar(dots, ax=plane, label=across.title, location="bottom", aspect=30.0)
+    for axes in (plane, close):
+        axes.axhline(0.0, color=GREY, linewidth=0.5)
+        axes.axvline(0.0, color=GREY, linewidth=0.5)
+        axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=BLACK, linewidth=1.0))
+        dots = axes.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
+        for one in result.crossings:
+            axes.plot([one.real] * 2, [one.imaginary, -one.imaginary], "x", color=RED, linestyle="none")
+        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
+    half = min(MOST, NEAR * float(np.median(np.sort(np.abs(poles - 1.0))[: (len(poles) + 1) // 2])))
+    plane.set(xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN))
+    close.set(xlim=(1.0 - half, 1.0 + half), ylim=(-half, half), title="about z = 1")
+    figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
     over.plot(values, result.radius, color=BLUE)
     over.axhline(1.0, color=BLACK, linewidth=1.0)
     for one in result.crossings:
-        plane.plot([one.real] * 2, [one.imaginary, -one.imaginary], "x", color=RED, linestyle="none")
         at = (float(across.of(one.value)), 1.0)
         over.plot(*at, "x", color=RED)
         left = at[0] > 0.5 * (values[0] + values[-1])
-        beside = {"xytext": (-4.0, 5.0) if left else (4.0, -12.0), "ha": "right" if left else "left"}
+        beside: dict[str, Any] = {"xytext": (-4.0, 5.0) if left else (4.0, -12.0), "ha": "right" if left else "left"}
         over.annotate(across.text_of(one.value, 4), at, textcoords="offset points", **beside)
-    plane.set(xlabel="real part", ylabel="imaginary part", xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), aspect="equal")
     over.set(xlabel=across.title, ylabel="spectral radius", xlim=(values[0], values[-1]))
-    low, high = float(result.radius.min()), float(result.radius.max())
+    low, high = float(result.radius.min()), min(float(result.radius.max()), HIGHEST)
     room = 0.05 * (max(high, 1.0) - min(low, 1.0))
     over.set_ylim(min(low, 1.0) - room, max(high, 1.0) + room)
     return figure

@@ -95,6 +95,8 @@ def expect_rest(system: System, calm: Floats) -> None:
     moved = np.abs(calm - calm[0]).max(axis=0) / np.maximum(1.0, np.abs(calm[0]))
     worst = int(moved.argmax())
     if moved[worst] > AT_REST:
+        none = "" if system.operating_point else ", of which there are none"
         raise NotAnEquilibriumError(
-            f"the operating point is not at rest: {exchanged_signals(system)[worst]} moves by {moved[worst]:.2g}"
+            f"the operating point is not at rest: {exchanged_signals(system)[worst]} moves by {moved[worst]:.2g}: "
+            f"expected values in [operating_point] at which the system rests{none}"
         )

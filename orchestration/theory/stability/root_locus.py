@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 COUNT = 40
 """Values by default"""
+SHARE = 0.2
+"""Share of the range of a limit by default, farther than which nearly all loops have long left the circle"""
 MAX_COUNT = 10_000
 DIGITS = 6
 """Digits of its values in a sentence"""
@@ -116,8 +118,9 @@ def locus(
 ) -> RootLocus:
     """The poles of a loop about its operating point, for `count` values of a quantity from `first` to `last`.
 
-    Quantity and range are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the
-    period of the only sampled component, from half to fifty times its value. Holds and delays are included; jitter,
+    Quantities are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the period of
+    the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
+    times that of the file, delays up to ten periods. Holds and delays are included; jitter,
     loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen.
 
     Raises `UsageError` for an invalid quantity or range, and as `linearise`.
@@ -127,7 +130,9 @@ def locus(
     loaded, _ = single_run_execution(request_of(request), "auto")
     varied = Varied(request=loaded, of=of or default_quantity(loaded))
     files = files_of(varied.system)
-    span = search_range(varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None)
+    span = search_range(
+        varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
+    )
     unit = span.unit.strip() or None
     values = [_short(float(value), unit) for value in np.linspace(span.values()[0], span.last, count)]
     return isolated_call(files.fmus.values(), _root_locus, varied, values, unit)

@@ -14,7 +14,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
-from orchestration.theory.stability.frequency import delayed, expect_decided
+from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
 from orchestration.theory.stability.loop_halves import closed, loop_gains
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
@@ -130,6 +130,16 @@ def test_a_delay_to_a_sampled_receiver_acts_where_a_message_misses_its_sample(pe
     assert math.hypot(crossing.real, crossing.imaginary) == pytest.approx(after, rel=1e-9)  # that which has jumped out
 
 
+def test_components_in_continuous_time_that_exchange_at_their_steps_are_named() -> None:
+    one = system_of("dc_servo")
+    coarse = dataclasses.replace(one.components["servo"], step=0.004)
+    to = dataclasses.replace(one.connections[0], name="coupling", start=("servo.angle",), end=("coarse.u",))
+    parts = {**one.components, "coarse": coarse}
+    coupled = dataclasses.replace(one, components=parts, connections=(*one.connections, to))
+    assert not stepped_couplings(one)
+    assert stepped_couplings(coupled) == [("servo", "coarse", 0.004)]
+
+
 def test_a_delay_margin_that_is_not_found_leaves_the_other_margins(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: object) -> float:
         raise UsageError("the loop is stable with all delays")
@@ -168,6 +178,9 @@ def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
     late = changed(system_of("dc_servo"), {DELAY: 0.02})
     found = bode(late)
     assert (found.stable, found.loops, found.sensitivity_peak) == (False, (), None)
+    gain, *_ = found.plot()["bode"].axes  # its loop gain is drawn all the same
+    assert gain.lines[0].get_ydata() == pytest.approx(20.0 * np.log10(np.abs(found.gains[0])))
+    assert "unstable" in gain.get_title()
     with pytest.raises(UsageError, match=r"^step: expected a stable loop; the spectral radius of this one is 1\.04"):
         step(late)
 
@@ -224,11 +237,15 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     gain, phase, sensitivity = bode_of("dc_servo").plot()["bode"].axes
     (loop,) = bode_of("dc_servo").loops
-    dot = [[loop.crossover], [1.0]]  # where the gain is 1
-    expected = [dot, *([[one.frequency] * 2, [1.0, 1.0 / one.factor]] for one in loop.gain_margins)]
+    dot = [[loop.crossover], [0.0]]  # where the gain is 1
+    expected = [dot, *([[one.frequency] * 2, [0.0, -20.0 * np.log10(one.factor)]] for one in loop.gain_margins)]
     for line, ends in zip(gain.lines[1:], expected, strict=False):
         assert np.transpose(line.get_xydata()) == pytest.approx(np.array(ends))
     turned = [[loop.crossover] * 2, [-180.0, loop.phase_margin - 180.0]]
     assert np.transpose(phase.lines[1].get_xydata()) == pytest.approx(np.array(turned), rel=1e-4)
-    assert [text.get_text() for axes in (gain, phase) for text in axes.texts] == ["× 0.169", "× 3.25", "33.7°"]
-    assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == bode_of("dc_servo").sensitivity_peak
+    assert [text.get_text() for axes in (gain, phase) for text in axes.texts] == [
+        "× 0.169 (-15.4 dB)", "× 3.25 (10.3 dB)", "33.7°",
+    ]  # fmt: skip
+    peak = 20.0 * np.log10(loop.sensitivity_peak)
+    assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == pytest.approx(peak)
+    assert repr(bode_of("dc_servo")) == f"<Bode: {document['verdict']}>"
