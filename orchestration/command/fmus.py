@@ -113,8 +113,8 @@ def validate(
 ) -> CommandResult:
     """Check FMUs: archive, description and behaviour in test runs; exit code 1 if there is any problem.
 
-    Accepts any co-simulation FMU of FMI 2.0 or 3.0; those built by quadcosim are checked for the rules of this project
-    too. All checks run in a separate process with limits.
+    Accepts any FMU of FMI 2.0 or 3.0: for co-simulation, model exchange, in event mode, for scheduled execution. Those
+    built by quadcosim are checked for the rules of this project too. All checks run in a separate process with limits.
     """
     from orchestration.components.building import fmus
     from orchestration.components.building.models import MODELS

@@ -89,6 +89,18 @@ int fmi2DoStep(void *c, double t, double h, int no_set) {
     usleep(SLOW);
 #endif
     m->s.x += (m->s.u - m->s.x) * h / (m->s.tau + h);
+#ifdef CREEPS
+    m->s.tau += h;
+#endif
+#ifdef LEAKS
+    static double *volatile lost;
+    lost = malloc(64);
+#endif
+#ifdef UNWRITTEN
+    volatile double *work = malloc(8 * sizeof *work);
+    m->s.x += 1e-9 * work[7];
+    free((void *)work);
+#endif
 #ifdef NOISY
     m->s.x += 1e-3 * rand() / RAND_MAX;
 #endif

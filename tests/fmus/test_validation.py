@@ -62,6 +62,30 @@ def test_of_a_foreign_fmu_only_what_breaks_the_standard_is_found(low_pass: Path)
     ]
 
 
+@needs_compiler
+@pytest.mark.parametrize(
+    ("macro", "rule", "words", "note"),
+    [
+        ("CREEPS", "start-values", "after 20 steps: expected a fixed parameter to stay what it is", False),
+        ("LEAKS", "repeatable", "its memory grows by 80 bytes in each step", True),
+        ("UNWRITTEN", "repeatable", "if fresh memory has other contents: it reads what nobody has written", False),
+    ],
+)
+def test_a_step_that_changes_what_is_fixed_or_misuses_memory_is_found(
+    macro: str, rule: str, words: str, note: bool, tmp_path: Path
+) -> None:
+    (finding,) = validate(lag(tmp_path / "Lag.fmu", macro))
+    assert (finding.rule, finding.note) == (rule, note)
+    assert words in finding.text
+
+
+@needs_compiler
+def test_what_initial_unknowns_lacks_is_said_once(tmp_path: Path) -> None:
+    listed = '<InitialUnknowns><Unknown index="2"/></InitialUnknowns>'
+    path = lag(tmp_path / "Lag.fmu", described={listed: ""})
+    assert validate(path) == [Finding("initial-unknowns", "InitialUnknowns: x is there 0 times, expected once")]
+
+
 def damaged(fmu: Path, path: Path, *damages: Damage) -> Path:
     files = files_of(fmu)
     for damage in damages:

@@ -17,6 +17,7 @@ from orchestration.components.checks.validation.excitation import (
 )
 from orchestration.components.checks.validation.fmu import Fmu, is_clocked
 from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, instance_of
+from orchestration.components.checks.validation.memory import in_use, other_contents
 from orchestration.components.checks.validation.run_comparison import deviations, difference
 from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.components.fmi.slaves import Message
@@ -29,6 +30,8 @@ SHARE = 0.02
 """Share of the time for an FMU that one run may take; a slow FMU gets fewer steps"""
 MAX_WATCHED = 1000
 """variables that are compared between runs, of an FMU with more"""
+LEAST_THIRD, LEAST_GROWTH = 10, 16
+"""Steps of each third of a run, and bytes in each step, from which growth is told from what a library keeps"""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -219,6 +222,28 @@ class Probe:
     def repeats(self) -> str | None:
         """The difference of an equal run of another fresh instance to the first; None if there is none."""
         return difference(self.run(self.general_plan), self.expected_rows)
+
+    @functools.cached_property
+    def reads_unwritten(self) -> str | None:
+        """The difference of a run in which fresh memory has other contents, of one that `repeats`."""
+        with other_contents():
+            return difference(self.run(self.general_plan), self.expected_rows)
+
+    @functools.cached_property
+    def growth(self) -> int:
+        """The bytes by which the heap grows in a step at start values, time after time; 0: it does not."""
+        points = self.points(PLAIN)
+        third, marks = len(points) // 3, list[int]()
+        with self.instance() as instance:
+            self.begin(instance, PLAIN)
+            for k, (t, h) in enumerate(points[: 3 * third], 1):
+                if not instance.advance(t, h):
+                    return 0
+                if k % third == 0:
+                    marks.append(in_use())
+            said = len(instance.messages)
+        growths = [(b - a) // third for a, b in itertools.pairwise(marks)]
+        return 0 if said or third < LEAST_THIRD or min(growths) < LEAST_GROWTH else min(growths)
 
     def deviations(self, found: list[Row], expected: list[Row], text: str) -> Iterator[str]:
         """As `run_comparison.deviations`."""

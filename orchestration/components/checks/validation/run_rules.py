@@ -1,6 +1,7 @@
 """Rules that run the FMU: it runs, and equal runs have equal results, whatever happened before or beside them."""
 
 import contextlib
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,6 +17,7 @@ from orchestration.components.fmi.read_description import Variable, declared_of
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 
+_FEW = ExcitationPlan(steps=20)
 _DIGITS = 5e-15
 """relative error of a number in a text of 15 digits"""
 
@@ -51,7 +53,8 @@ def getters(probe: Probe) -> Iterator[str]:
 
 
 def start_values(probe: Probe) -> Iterator[str]:
-    """Variables have their declared start values to 15 digits; in FMUs of this project to the last bit.
+    """Variables have their declared start values to 15 digits, in FMUs of this project to the last bit; no step changes
+    what is fixed, nor a parameter.
 
     FMI 2.0 allows no reading before initialisation; FMUs of this project support it nevertheless.
     """
@@ -61,11 +64,21 @@ def start_values(probe: Probe) -> Iterator[str]:
         moments = {"freshly instantiated": instance.row(declared)} if is_readable else {}
         instance.start({}, probe.start)
         moments["after initialisation"] = instance.row(declared)
+        kept = [v for v in probe.elements if v.variability in ("constant", "fixed") or v.causality == "parameter"]
+        before, points = instance.row(kept), probe.points(_FEW)
+        steps = sum(1 for _ in itertools.takewhile(lambda point: instance.advance(*point), points))
+        after = instance.row(kept)
     for v in declared:
         for moment, row in moments.items():
             if not _starts(row[v.name], start_value(v), exactly=probe.fmu.is_ours):
                 yield f"{v.name}: start = {v.start}, but {moment} it is {row[v.name]!r}"
                 break
+    for v in kept:
+        if not same(before[v.name], after[v.name]):
+            yield (
+                f"{v.name}: {before[v.name]!r} after initialisation, but {after[v.name]!r} after {steps} steps: "
+                f"expected a {v.variability} {v.causality} to stay what it is unless it is set"
+            )
 
 
 def _keeps_start(v: Variable) -> bool:
@@ -123,10 +136,17 @@ def variable_steps(probe: Probe) -> Iterator[str]:
 
 
 def repeatable(probe: Probe) -> Iterator[str]:
-    """Two fresh instances give the same run; otherwise, as with `rand()`, rules that compare runs are not tried."""
+    """Two fresh instances give the same run; otherwise, as with `rand()`, rules that compare runs are not tried.
+
+    So they do where fresh memory has other contents. That memory grows from step to step is a note.
+    """
     if probe.repeats is not None:
         text = f"{probe.repeats}, as in an equal run before; rules that compare runs are not tried"
         yield text if probe.fmu.is_ours else Note(text)
+    elif probe.reads_unwritten is not None:
+        yield f"{probe.reads_unwritten}, if fresh memory has other contents: it reads what nobody has written"
+    if probe.growth:
+        yield Note(f"its memory grows by {probe.growth} bytes in each step: a long run may exhaust it")
 
 
 def inputs_set_twice(probe: Probe) -> Iterator[str]:
