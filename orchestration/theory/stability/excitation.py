@@ -1,16 +1,19 @@
 """An instance at rest, whose inputs are pulsed, and which is followed from saved states.
 
 Small deviations are linear as far as pulses of two sizes agree: this determines the size of pulses and how long a
-response is followed.
+response is followed. Code that rounds more than double precision does, as in single precision, drowns small pulses. It
+gets large ones, of several sizes, of which the linear part is taken.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from orchestration.components.fmi.instance import Instance
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 
 PULSE = 1e-6
@@ -29,6 +32,21 @@ NONLINEAR = 1e-9
 LEAST = 3.0
 """Factor of the least difference that any size has, up to which it is linear, too"""
 ROUNDING = float(np.finfo(float).eps)
+COARSE = 1e-5
+"""Difference of responses to small pulses, relative, from which an instance is taken to round coarsely"""
+DITHER = (1.0, 1.137, 1.291, 1.443)
+"""Factors of the pulses that show it: rounded alike at two sizes, responses may agree by chance"""
+SIZES = np.linspace(0.3, 1.0, 6)
+"""Factors of the large pulses"""
+LINEAR_PART = np.linalg.pinv(np.stack([SIZES, SIZES**3], axis=1))[0]
+"""Weights of the responses to them: the linear part of odd cubic functions that are fitted to them"""
+LARGE_PULSE = 0.01
+LARGE_FACTORS = np.geomspace(0.03, 30.0, 7)
+"""Factors of the large pulse of each input that are tried"""
+FOLLOWS = 0.05
+"""Share of the largest response of an output, from which it follows an input"""
+LARGER = (1e-3, 1e-2, 1e-1)
+"""Pulses of an input that none of the outputs follows, by which it is seen whether they follow larger ones"""
 ALIKE = 0.1
 """Difference of a step to two of half its length, relative to the largest response, up to which it is used instead"""
 
@@ -70,8 +88,12 @@ class SavedState:
     """Time of the next step [s]"""
 
 
-Pair = tuple[SavedState, SavedState]
-"""A state after a pulse up, and after one down"""
+States = tuple[SavedState, ...]
+"""States after a pulse up and one down, of each size"""
+
+
+class ImpreciseError(UsageError):
+    """Small deviations of an instance cannot be told from its rounding, whatever the method."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +117,9 @@ class Excitation:
 
     def __init__(self, rest: Rest) -> None:
         self.inputs, self.outputs = rest.inputs, rest.outputs
-        self.pulse = PULSE
+        self.pulse, self.largest = PULSE, MAX_DEVIATION
+        self.sizes, self.parts = np.ones(1), np.ones(1)
+        self.scale = np.maximum(1.0, np.abs(rest.held))
         self._fmu, self.held, self._inputs_now = rest.fmu, rest.held, rest.held.copy()
         self._write = rest.fmu.writer(rest.inputs, self._inputs_now)
         self._outputs_now: Floats = np.zeros(len(rest.outputs))
@@ -117,10 +141,30 @@ class Excitation:
         signals = (self.inputs, self.outputs) == (other.inputs, other.outputs)
         return self._fmu is other._fmu and signals and np.array_equal(self.held, other.held)
 
+    def measure_as(self, other: "Excitation") -> None:
+        """Take the pulses of another excitation."""
+        self.pulse, self.largest, self.scale = other.pulse, other.largest, other.scale
+        self.sizes, self.parts = other.sizes, other.parts
+
     @property
     def pulses(self) -> Floats:
         """The pulse of each input."""
-        return self.pulse * np.maximum(1.0, np.abs(self.held))
+        return self.pulse * self.scale
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the instance rounds coarsely, and is measured by large pulses."""
+        return len(self.sizes) > 1
+
+    @property
+    def moves(self) -> list[float]:
+        """The factors of the pulses up and down, of each size."""
+        return [sign * float(size) for size in self.sizes for sign in (1.0, -1.0)]
+
+    def apart(self, followed: Sequence[Floats]) -> Floats:
+        """Twice the linear part of what follows after the `moves`."""
+        halves = [part * (up - down) for part, up, down in zip(self.parts, followed[::2], followed[1::2])]
+        return np.asarray(sum(halves[1:], halves[0]))
 
     def pulsed(self, i: int, factor: float) -> Floats:
         """The inputs with a pulse on one of them, times `factor`."""
@@ -166,15 +210,14 @@ class Excitation:
             self._followed[start, rung] = self.stepped(start, rung, self.held)
         return self._followed[start, rung]
 
-    def futures(self, pair: Pair, rungs: Sequence[Rung]) -> Floats:
+    def futures(self, states: States, rungs: Sequence[Rung]) -> Floats:
         """What outputs do from a state, the inputs at rest: their differences at the end of each rung, in a row."""
-        up, down = (self.outputs_after(state, rungs) for state in pair)
-        return np.asarray(((up - down) / self.weight).ravel() / (2.0 * self.pulse))
+        apart = self.apart([self.outputs_after(state, rungs) for state in states])
+        return np.asarray((apart / self.weight).ravel() / (2.0 * self.pulse))
 
-    def after_pulse(self, i: int, rung: Rung) -> Pair:
+    def after_pulse(self, i: int, rung: Rung) -> States:
         """The states after a pulse on an input over a rung."""
-        up, down = (self.stepped(self.rest, rung, self.pulsed(i, sign))[1] for sign in (1, -1))
-        return up, down
+        return tuple(self.stepped(self.rest, rung, self.pulsed(i, move))[1] for move in self.moves)
 
     def response(self, i: int, rungs: Sequence[Rung], *, factor: float = 1.0, lasting: bool = False) -> Floats:
         """The response to a pulse on an input over the first rung, or all, shape (n, outputs); n ends with a large one.
@@ -182,18 +225,61 @@ class Excitation:
         The pulse is multiplied by `factor`, and the response divided by it.
         """
         courses = []
-        for sign in (factor, -factor):
-            pulsed = self.pulsed(i, sign)
+        for move in self.moves:
+            pulsed = self.pulsed(i, factor * move)
             later = pulsed if lasting else self.held
             legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
-            courses.append(self._course(self.rest, legs, MAX_DEVIATION))
-        up, down = (course[: min(map(len, courses))] for course in courses)
-        return np.asarray((up - down) / self.weight / (2.0 * factor * self.pulse))
+            courses.append(self._course(self.rest, legs, self.largest))
+        apart = self.apart([course[: min(map(len, courses))] for course in courses])
+        return np.asarray(apart / self.weight / (2.0 * factor * self.pulse))
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
-        up, down = (self._course(self.rest, [(self.held + sign * x, rung) for x in moves]) for sign in (1.0, -1.0))
-        return np.asarray(0.5 * (up - down))
+        courses = [self._course(self.rest, [(self.held + move * x, rung) for x in moves]) for move in self.moves]
+        return np.asarray(0.5 * self.apart(courses))
+
+    # -- coarse rounding -------------------------------------------------------------------------------------------
+
+    def rounds_coarsely(self, rungs: Sequence[Rung]) -> bool:
+        """Whether responses to the chosen pulses differ by their sizes, more than a linear model may."""
+        for i in range(len(self.inputs)):
+            found = [self.response(i, rungs, factor=factor) for factor in DITHER]
+            each = np.array([course[: min(map(len, found))] for course in found])
+            if np.ptp(each, axis=0).max(initial=0.0) > COARSE * np.abs(each).max(initial=0.0):
+                return True
+        return False
+
+    def use_large_pulses(self, rungs: Sequence[Rung]) -> None:
+        """Take large pulses of several sizes: of each input that to which, and to larger ones, responses agree best."""
+        self.sizes, self.parts, self.largest, self.pulse = SIZES, LINEAR_PART, np.inf, LARGE_PULSE
+        found = [self.response(i, rungs) for i in range(len(self.inputs))]
+        usual = np.max([np.abs(one).max(axis=0) for one in found], axis=0, initial=0.0)
+        usual, scale = np.where(usual > 0.0, usual, 1.0), self.scale.copy()
+        for i in range(len(self.inputs)):
+            found = []
+            for factor in LARGE_FACTORS:
+                self.scale = scale * factor
+                found.append(self.response(i, rungs) / factor / usual)
+            apart = [float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(found)]
+            scale[i] *= LARGE_FACTORS[int(np.nanargmin([*apart, np.inf]))]
+        self.scale = scale
+
+    def expect_response(self, rungs: Sequence[Rung]) -> None:
+        """Raise `ImpreciseError` for an input of which outputs follow large deviations, but small ones not at all."""
+        small = [self.response(i, rungs) for i in range(len(self.inputs))]
+        usual = np.max([np.abs(one).max(axis=0, initial=0.0) for one in small], axis=0, initial=0.0)
+        chosen = self.pulse, self.largest
+        self.largest = np.inf
+        for i in (i for i, one in enumerate(small) if not one.any()):
+            for self.pulse in LARGER:
+                follows = np.abs(self.response(i, rungs)).max(axis=0, initial=0.0)
+                if (follows > FOLLOWS * usual).any():
+                    raise ImpreciseError(
+                        f"{self.name} follows a change of {self.inputs[i]} by {self.pulse:g}, but not by "
+                        f"{chosen[0]:g}, as code that quantises, or with a dead zone: what small deviations do cannot "
+                        "be told"
+                    )
+        self.pulse, self.largest = chosen
 
     # -- how far it is linear -------------------------------------------------------------------------------------
 

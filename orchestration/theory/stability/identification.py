@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.stability.excitation import Excitation, Rest, Rung
+from orchestration.theory.stability.excitation import COARSE, Excitation, ImpreciseError, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import Tangent
 
@@ -25,6 +25,10 @@ LONGEST_STEP = 64.0
 """Steps that make a ladder, in periods, at most"""
 SAMPLES = 32
 """Samples of the ladder of a sampled component"""
+FEW = 4
+"""Samples over which it is seen whether a sampled component rounds coarsely"""
+SHRUNK = (1.0, 0.3, 0.1)
+"""Factors on large pulses"""
 FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
@@ -42,8 +46,7 @@ def of_samples(rest: Rest, period: float, factor: float) -> Tangent | LiftedTang
     `UsageError` as `Tangent`, and where it does not repeat.
     """
     excitation, sample = Excitation(rest), Rung(1, period)
-    count = excitation.choose_pulse([sample] * (2 * SAMPLES))
-    excitation.pulse *= factor
+    count = _choose_pulse(excitation, [sample] * (2 * SAMPLES), factor)
     samples = _samples_until_alike(excitation, sample)
     if samples > 1:
         rest.fmu.restore(excitation.rest.saved)
@@ -56,17 +59,44 @@ def of_samples(rest: Rest, period: float, factor: float) -> Tangent | LiftedTang
 
 def _of_alike_samples(excitation: Excitation, period: float, factor: float, rungs: int) -> Tangent:
     sample = Rung(1, period)
-    count = excitation.choose_pulse([sample] * (2 * rungs))
+    return _tangent(excitation, sample, _choose_pulse(excitation, [sample] * (2 * rungs), factor))
+
+
+def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung], factor: float) -> int:
+    """Choose the pulses, large ones for a component that rounds coarsely; the rungs over which it is linear."""
+    count = excitation.choose_pulse(rungs)
+    excitation.expect_response(rungs[:FEW])
+    if excitation.rounds_coarsely(rungs[:FEW]):
+        excitation.use_large_pulses(rungs[:FEW])
+        count = len(rungs)
     excitation.pulse *= factor
-    return _tangent(excitation, sample, count)
+    return count
 
 
 def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
     """The tangent of a component whose samples are alike, and linear over `count` of them."""
     ladder = [sample] * max(1, count // 2)
-    tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
-    tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
-    return tangent
+
+    def proved(excitation: Excitation) -> Tangent:
+        tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
+        tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
+        return tangent
+
+    if not excitation.is_coarse:
+        return proved(excitation)
+    found, refused = list[Tangent](), list[UsageError]()
+    for factor in SHRUNK:  # all inputs at once may lead where the component saturates
+        smaller = copy(excitation)
+        smaller.pulse = factor * excitation.pulse
+        try:
+            found.append(proved(smaller))
+            if found[-1].accuracy <= COARSE:
+                break
+        except UsageError as error:
+            refused.append(error)
+    if not found:
+        raise ImpreciseError(str(refused[0]))
+    return min(found, key=lambda one: one.accuracy)
 
 
 def in_continuous_time(rest: Rest, period: float, step: float, factor: float, *, unit: float | None = None) -> Tangent:

@@ -59,6 +59,8 @@ class Linearised:
     deviations decay."""
     poles: tuple[Pole, ...]
     """The poles of the whole loop, as `radius`, the slowest first, without those at 0."""
+    precision: float = 0.0
+    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
 
     def __repr__(self) -> str:
         return f"<Linearised: {self.verdict}>"
@@ -67,7 +69,7 @@ class Linearised:
     def verdict(self) -> str:
         """Whether the linear loop is stable, and its sizes."""
         sizes = f"{self.name} with {_count_of(len(self.component.A))}, the rest with {_count_of(len(self.rest.A))}"
-        return f"{stability_of(self.radius)}, {self.clock}: {sizes}"
+        return f"{stability_of(self.radius, self.precision)}, {self.clock}: {sizes}{known_to(self.precision)}"
 
     @property
     def dt(self) -> float:
@@ -135,6 +137,7 @@ def cut_open(loop: AtRest, name: str) -> Linearised:
         samples=samples,
         radius=float(np.abs(np.linalg.eigvals(whole)).max(initial=0.0)),
         poles=as_poles(poles_of(whole), rest.dt),
+        precision=loop.precision,
     )
 
 
@@ -164,9 +167,14 @@ def clock_of(dt: float, samples: int) -> str:
     return often if samples == 1 else f"{often}, in a period of all rates of {quantity(samples * dt, 's')}"
 
 
-def stability_of(radius: float) -> str:
+def known_to(precision: float) -> str:
+    """How well a loop is known of which components round coarsely, in words; nothing of others."""
+    return f", known to {precision:.0g}, as code in single precision" if precision else ""
+
+
+def stability_of(radius: float, precision: float = 0.0) -> str:
     """Whether a loop with a spectral radius is stable, in words."""
-    if math.isclose(radius, 1.0, abs_tol=NEAR_ONE):
+    if math.isclose(radius, 1.0, abs_tol=max(NEAR_ONE, precision)):
         return f"not decidably stable: spectral radius {radius:.9g}"
     return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {radius:.4g}"
 

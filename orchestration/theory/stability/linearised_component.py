@@ -15,7 +15,16 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.theory.stability.excitation import ROUNDING, Errors, Excitation, Pair, Rest, Rung, SavedState
+from orchestration.theory.stability.excitation import (
+    ROUNDING,
+    Errors,
+    Excitation,
+    ImpreciseError,
+    Rest,
+    Rung,
+    SavedState,
+    States,
+)
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
 STANDS_OUT = 10.0
@@ -24,10 +33,17 @@ SCALINGS = 4
 """Rounds in which rows and columns are scaled to errors of one size"""
 UNPROVEN = 1e-5
 """Error of a predicted response, relative to the largest of that output, from which a linear model is refused"""
+IMPRECISE = 1e-3
+"""Error of a predicted response of a component that rounds coarsely, from which its model is refused"""
 PROOF_STEPS = 256
 """Steps of the random input, at most"""
 LINEAR = 1e-6
 """Error allowed of outputs predicted from an initial state, relative, or absolute where these are smaller than 1"""
+
+
+SIMILAR = 10.0
+"""Factor on the accuracy of a component that rounds coarsely, up to which it holds at another point of rest"""
+SINGLE = float(np.finfo(np.float32).eps)
 
 
 class Tangent(LinearSimulator):
@@ -52,6 +68,11 @@ class Tangent(LinearSimulator):
         """The pulse by which it was measured, relative."""
         return self._excitation.pulse
 
+    @property
+    def precision(self) -> float:
+        """The accuracy, relative, of a component that rounds coarsely; 0 of others."""
+        return self.accuracy if self._excitation.is_coarse else 0.0
+
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""
         by_state, by_input = self.derivatives(h)
@@ -64,15 +85,17 @@ class Tangent(LinearSimulator):
         key = round(h * NANOSECONDS)
         if key not in self._known:
             excitation, rung = self._excitation, self._rung(h)
-            by_pair = [self._difference([excitation.followed(s, rung) for s in pair]) for pair in self._pairs]
+            by_state = [self._difference([excitation.followed(s, rung) for s in states]) for states in self._produced]
             sizes = excitation.pulses / excitation.pulse
             by_input = [
-                self._difference([excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in (1, -1)])
+                self._difference(
+                    [excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in excitation.moves]
+                )
                 / sizes[i]
                 for i in range(len(self.inputs))
             ]
             size = len(self.outputs) + len(self._inverse)
-            after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_pair, by_input))
+            after, moved = (np.column_stack(c) if c else np.zeros((size, 0)) for c in (by_state, by_input))
             self._known[key] = after @ self._inverse, moved
         return self._known[key]
 
@@ -101,13 +124,14 @@ class Tangent(LinearSimulator):
         excitation = Excitation(rest)
         if not excitation.is_like(self._excitation):
             return None
+        excitation.measure_as(self._excitation)
         again = copy(self)
         again.state, again.input, again.output = (np.zeros_like(x) for x in (self.state, self.input, self.output))
         try:
             again._prove(excitation)
         except UsageError:
             return None
-        return again if again.accuracy <= LINEAR else None
+        return again if again.accuracy <= max(LINEAR, SIMILAR * self.precision) else None
 
     def prove(self, h: float, duration: float) -> None:
         """Compare its response to a random input, in steps of `h` over a `duration` [s], with that of the component.
@@ -131,13 +155,19 @@ class Tangent(LinearSimulator):
             predicted[k], state = after[:cut], after[cut:]
         largest = np.abs(measured).max(axis=0, initial=0.0)
         error = np.abs(measured - predicted).max(axis=0, initial=0.0)
-        beyond_rounding = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
-        self.accuracy = float((beyond_rounding / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
-        if not self.accuracy <= UNPROVEN:
-            raise UsageError(
+        if excitation.is_coarse:
+            error[largest <= STANDS_OUT * SINGLE * excitation.weight] = 0.0
+        else:
+            error = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
+        self.accuracy = float((error / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
+        allowed = IMPRECISE if excitation.is_coarse else UNPROVEN
+        if not self.accuracy <= allowed:
+            kind = ImpreciseError if excitation.is_coarse else UsageError
+            cause = ", as its outputs are rounded, as in single precision" if excitation.is_coarse else ""
+            raise kind(
                 f"{excitation.name}: its linear model, of {len(state)} states, does not predict the response to a "
                 f"random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, expected at most "
-                f"{UNPROVEN:g}"
+                f"{allowed:g}{cause}"
             )
 
     # -- coordinates --------------------------------------------------------------------------------------------
@@ -145,27 +175,27 @@ class Tangent(LinearSimulator):
     def _find_coordinates(self, errors: Errors, fewest: int) -> None:
         """Produce states at points of the ladder until no further coordinates appear."""
         excitation, ladder = self._excitation, self.ladder
-        pairs = [excitation.after_pulse(i, ladder[0]) for i in range(len(self.inputs))]
-        produced, columns, noise, ranks = list[Pair](), list[Floats](), list[Floats](), list[int]()
+        latest = [excitation.after_pulse(i, ladder[0]) for i in range(len(self.inputs))]
+        produced, columns, noise, ranks = list[States](), list[Floats](), list[Floats](), list[int]()
         for point, rung in enumerate(ladder):
-            produced += pairs
-            columns += [excitation.futures(pair, ladder) for pair in pairs]
-            noise += [errors.of_futures(i, point) for i in range(len(pairs))]
-            found = self._coordinates(np.column_stack(columns), np.column_stack(noise)) if pairs else None
+            produced += latest
+            columns += [excitation.futures(states, ladder) for states in latest]
+            noise += [errors.of_futures(i, point) for i in range(len(latest))]
+            found = self._coordinates(np.column_stack(columns), np.column_stack(noise)) if latest else None
             ranks.append(0 if found is None else len(found[1]))
             if len(ranks) >= fewest and len(set(ranks[-3:])) == 1:
                 break
-            pairs = [(excitation.followed(up, rung)[1], excitation.followed(down, rung)[1]) for up, down in pairs]
+            latest = [tuple(excitation.followed(one, rung)[1] for one in states) for states in latest]
         if found is None or not len(found[1]):
             self._axes = self._back = np.zeros((len(ladder) * len(self.outputs), 0))
-            self._pairs, self._inverse = [], np.zeros((0, 0))
+            self._produced, self._inverse = [], np.zeros((0, 0))
             return
         self._axes, chosen, self._back = found
         if ranks[-1] == min(len(columns), len(self._axes)):
             raise UsageError(
                 f"{excitation.name}: has more states than {len(ranks)} pulses and {len(ladder)} steps show"
             )
-        self._pairs = [produced[k] for k in chosen]
+        self._produced = [produced[k] for k in chosen]
         self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))
 
     def _coordinates(self, futures: Floats, errors: Floats) -> tuple[Floats, list[int], Floats]:
@@ -190,11 +220,11 @@ class Tangent(LinearSimulator):
         here, rest = (self._excitation.outputs_after(s, self.ladder) for s in (state, self._excitation.rest))
         return np.asarray(((here - rest) / self._excitation.weight).ravel())
 
-    def _difference(self, both: Sequence[tuple[Floats, SavedState]]) -> Floats:
+    def _difference(self, followed: Sequence[tuple[Floats, SavedState]]) -> Floats:
         """Outputs and coordinates after a step, per unit of the pulse up and down."""
-        (up, after_up), (down, after_down) = both
-        future = self._axes.T @ self._excitation.futures((after_up, after_down), self.ladder)
-        return np.asarray(np.concatenate([(up - down) / (2.0 * self.pulse), future]))
+        outputs, states = zip(*followed, strict=True)
+        future = self._axes.T @ self._excitation.futures(states, self.ladder)
+        return np.asarray(np.concatenate([self._excitation.apart(outputs) / (2.0 * self.pulse), future]))
 
     def _rung(self, h: float) -> Rung:
         return Rung(1, h) if self.unit is None else Rung(round(h / self.unit), self.unit)

@@ -10,7 +10,10 @@ from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
+from orchestration.theory.stability.excitation import ImpreciseError
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
+from orchestration.theory.stability.lifted_component import LiftedTangent
+from orchestration.theory.stability.linearise import known_to
 from orchestration.theory.stability.loop_at_rest import KnownTangents
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError, deterministic
 from orchestration.theory.stability.period_map import growth_of_loop
@@ -24,6 +27,10 @@ OTHER_PULSE = 0.25
 """factor of the second pulse, whose growth is compared"""
 OTHER_SIZE = 100.0
 """Factor of the second pulse of twin runs, which has to confirm growth and decay"""
+DITHERED = 1.37
+"""Factor of a third, whose growth has to be the same"""
+AGREE = 0.1
+"""Difference of it allowed, as a share of how much growth changes from one side of the limit to the other"""
 NEAR = 0.1
 """Distance from the limit at which it has to, relative"""
 
@@ -54,7 +61,7 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
             )
         with closing(Instances()) as instances:
             return _through_saved_states(at, span, instances)
-    except NotAnEquilibriumError as error:
+    except (NotAnEquilibriumError, ImpreciseError) as error:
         return LinearLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
@@ -79,16 +86,27 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
     slope = (growths[above] - growths[below]) / (above - below)
     difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE) - growths[below])
-    return replace(found, accuracy=found.accuracy + difference / slope)
+    wholes = [one.whole if isinstance(one, LiftedTangent) else one for _, _, one in known.values()]
+    precise = known_to(max(one.precision for one in wholes))
+    return replace(found, method=f"{LOOP}{precise}", accuracy=found.accuracy + difference / slope)
 
 
 def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
-    """By perturbed twin runs; none where growth depends on the size of the pulse, as of code that rounds coarsely."""
+    """By perturbed twin runs; none where growth depends on the size of the pulse, as of code that rounds coarsely.
+
+    Rounding grows and decays as rounding does, whatever the limit: two pulses of about one size have to agree, too.
+    """
     for factor in (1.0, OTHER_SIZE):
         with closing(Instances()) as instances:
             found = _first_growth(partial(_rate, at, instances, factor), span, TWINS_TOLERANCE, TWINS)
             if found.limit is None:
                 return found
+            near = _near(found.limit, span)
+            first, alike = (
+                [_rate(at, instances, size, value) for value in near] for size in (factor, DITHERED * factor)
+            )
+            if max(abs(a - b) for a, b in zip(first, alike)) > AGREE * abs(first[1] - first[0]):
+                continue
             if all(
                 [_rate(at, instances, factor * OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
                 for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))

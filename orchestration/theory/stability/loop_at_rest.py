@@ -83,6 +83,12 @@ class AtRest:
         """The components about rest."""
         return {name: self.tangent(name) for name in self.simulation.instances}
 
+    @property
+    def precision(self) -> float:
+        """The error of its components that round coarsely, relative; 0: there are none."""
+        wholes = [one.whole if isinstance(one, LiftedTangent) else one for one in self.tangents.values()]
+        return max((one.precision for one in wholes), default=0.0)
+
     def tangent(self, name: str) -> AnyTangent:
         """A component about rest."""
         self.simulation.instances[name].restore(self.saved_states[name])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestration.foundation.basics.simulator import Floats, Transfer
-from orchestration.theory.stability.excitation import Excitation, Rest, Rung
+from orchestration.theory.stability.excitation import Excitation, ImpreciseError, Rest, Rung
 from orchestration.theory.stability.identification import of_samples
 from orchestration.theory.stability.lifted_component import of_one_rate
 from orchestration.theory.stability.linearised_component import Tangent
@@ -141,3 +141,49 @@ def test_states_are_saved_and_put_back() -> None:
     measured.restore(kept)
     assert responses(measured, 4) == later
     assert np.any(np.array(later) != 0.0)
+
+
+class InSinglePrecision(Line):
+    """Its sum with 9.81 is held in single precision; far from rest it is bent."""
+
+    held = np.float32(9.81)
+
+    def step(self, t: float, h: float) -> None:
+        u = np.float32(self.u)
+        first = self.held + np.float32(0.9) * u - np.float32(0.2) * u * u * u
+        self.kept = np.concatenate([[float(first)], 9.81 + 0.9 * (self.kept[:-1] - 9.81)])
+
+    def save(self) -> bytes:
+        return self.kept.tobytes()
+
+
+def test_a_component_in_single_precision_is_measured_by_large_pulses() -> None:
+    fmu = InSinglePrecision(3)
+    fmu.kept += float(fmu.held)
+    measured = tangent(fmu)
+    assert measured.pulse > 1e-4
+    assert len(measured.state) == 2
+    assert responses(measured, 4) == pytest.approx([0.9 * x for x in responses(Line(3), 4)], abs=1e-5)
+    assert 0.0 < measured.precision < 1e-4
+    assert tangent(Line(3)).precision == 0.0
+
+
+class Quantising(Line):
+    """One whose input is that of a converter with steps of 0.005."""
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = np.concatenate([[0.005 * round(self.u / 0.005)], 0.9 * self.kept[:-1]])
+
+
+class Noisy(Line):
+    """One whose output has three digits."""
+
+    def step(self, t: float, h: float) -> None:
+        super().step(t, h)
+        self.kept[0] = 0.3 * round((0.01 * self.u + 0.15) / 0.3)
+
+
+@pytest.mark.parametrize(("fmu", "said"), [(Quantising(2), "follows a change of u by 0.01"), (Noisy(2), "rounded")])
+def test_of_a_component_that_quantises_coarsely_nothing_is_told(fmu: Line, said: str) -> None:
+    with pytest.raises(ImpreciseError, match=said):
+        tangent(fmu)
