@@ -23,7 +23,11 @@ def test_every_marked_place_has_its_record() -> None:
     pages = records.blocks()
     for page in (records.ROOT / "README.md", *(records.ROOT / "docs").rglob("*.md")):
         marked = records.MARKED.findall(page.read_text(encoding="utf-8"))
-        assert {*marked} == {*pages.get(str(page.relative_to(records.ROOT)), {})}, page
+        recorded = {*pages.get(str(page.relative_to(records.ROOT)), {})}
+        assert {*marked} == recorded, (
+            f"{', '.join({*marked} ^ recorded)}: expected the comments `claim NAME` and `end` in {page}, and it in "
+            f"`where` of docs/claims/NAME.toml"
+        )
 
 
 @pytest.mark.parametrize("name", CLAIMS)
@@ -32,16 +36,18 @@ def test_every_command_names_a_study_or_a_section_that_exists(name: str) -> None
 
     for place in records.files_of(CLAIMS[name]):
         if place.startswith("section "):
-            assert place.removeprefix("section ") in make_findings.SECTIONS
+            known = place.removeprefix("section ") in make_findings.SECTIONS
         else:
-            assert (records.ROOT / place).is_file()
+            known = (records.ROOT / place).is_file()
+        assert known, f"docs/claims/{name}.toml: its commands name {place}, which does not exist"
 
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_every_number_of_a_record_is_said(name: str) -> None:
     claim = CLAIMS[name]
     text = " ".join([claim.claim, *(one.number for one in claim.tried)])
-    assert not [number for number in claim.numbers if f"{{{number}:" not in text]
+    unsaid = [number for number in claim.numbers if f"{{{number}:" not in text]
+    assert not unsaid, f"docs/claims/{name}.toml: no sentence has {{{', '.join(unsaid)}:…}}, which [numbers] declares"
 
 
 STEPS = records.steps()

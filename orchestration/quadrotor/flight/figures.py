@@ -3,19 +3,20 @@
 from orchestration.quadrotor.flight.commands import commands
 from orchestration.quadrotor.flight.energy import energy
 from orchestration.quadrotor.flight.errors import components_of_errors, errors
-from orchestration.quadrotor.flight.names import FIGURES
 from orchestration.quadrotor.flight.path import path
 from orchestration.quadrotor.flight.phase import phase
 from orchestration.quadrotor.flight.spectrum import spectrum
 from orchestration.simulation.figures.views import Drawing
 
 DRAWING = Drawing(
-    makers=dict(
-        zip(
-            FIGURES,
-            (path, errors, components_of_errors, commands, energy, phase, spectrum),
-            strict=True,
-        )
-    ),
+    makers={
+        "path": path,
+        "errors": errors,
+        "components": components_of_errors,
+        "commands": commands,
+        "energy": energy,
+        "phase": phase,
+        "spectrum": spectrum,
+    },
     columns=lambda system, described: described.keys(),
 )
