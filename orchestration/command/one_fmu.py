@@ -36,7 +36,15 @@ class OneFmuFlags:
     output_interval: Annotated[
         float | None, _of_fmu("--output-interval", "Distance of rows, and communication step.", "SECONDS")
     ] = None
-    tolerance: Annotated[float | None, _of_fmu("--tolerance", "Relative tolerance of its solver.", "R")] = None
+    tolerance: Annotated[
+        float | None,
+        _of_fmu(
+            "--tolerance",
+            "Relative tolerance of its solver; default: its experiment's, by model exchange else 1e-6. The "
+            "absolute one is that times the nominal value of a state.",
+            "R",
+        ),
+    ] = None
     solver: Annotated[
         str | None, _of_fmu("--solver", "By model exchange; default: dormand-prince.", "|".join(SOLVERS))
     ] = None
