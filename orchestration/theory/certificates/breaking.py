@@ -63,7 +63,7 @@ def _cycles(family: LoopFamily, maps: dict[Draw, Floats], longest: int) -> Itera
             return
         for i, draw in enumerate(draws):
             for begin, end in family.letters[draw[0]].moves:
-                if begin == mode:
+                if begin == mode and end >= start:  # those through a lower mode began there
                     yield from extended(start, end, (*word, i), maps[draw] @ product)
 
     for start in sorted({begin for letter in family.letters for begin, _ in letter.moves}):

@@ -82,6 +82,8 @@ class Certified:
         broken = f"none found up to {shown(self.largest)} that breaks the loop"
         if self.breaking is not None:
             broken = f"one of {shown(self.breaking)} breaks the loop"
+        if self.small_gain is not None and self.small_gain > (self.certified or 0.0):
+            broken += f"; by the small-gain bound, without a certificate, up to {shown(self.small_gain)} is stable"
         return f"{self.of}: {proved}, {broken} (small deviations)"
 
     def __post_init__(self) -> None:
@@ -204,16 +206,21 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cer
         states = len(timeline.family().kept)
         return Certified(of=varying.path, breaking=0, largest=MOST_LOST, searched=searched, states=states)
     broken: BreakingSequence | None = None
-    value, certificate = None, None
+    families = list[LoopFamily]()
     for run in range(MOST_LOST + 1):
-        progress(run / (MOST_LOST + 1))
+        progress(0.5 * run / (MOST_LOST + 1))
         family = timeline.family(run=run)
         broken = breaking_at(family, run, run + LONGEST_SEQUENCE // 2)
         if broken is not None:
             break
+        families.append(family)
+    value, certificate = None, None
+    for run, family in reversed([*enumerate(families)]):  # a proof for a run is one for all shorter ones
+        progress(1.0 - 0.5 * (run + 1) / (MOST_LOST + 1))
         found = find_certificate(family, [varying.path])
         if found is not None:
             value, certificate = run, found.certificate.to_json()
+            break
     return Certified(
         of=varying.path, certified=value, breaking=None if broken is None else broken.value,
         breaking_sequence=() if broken is None else broken.sequence, largest=MOST_LOST,

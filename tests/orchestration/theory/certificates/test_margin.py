@@ -3,6 +3,7 @@
 import functools
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,13 @@ def test_runs_of_losses_are_certified_up_to_the_one_that_breaks(system: System, 
     assert [name for name, _ in lost.breaking_sequence] == ["lost", "lost", "arrives"]
     proof = check(lost.save(tmp_path / "lost.json"), faster)
     assert proof.runs == {"arrives": None, "lost": 1}
+
+
+def test_a_small_gain_bound_beyond_what_is_certified_is_in_the_verdict() -> None:
+    """Certificates end at a period."""
+    found = Certified(of=COMMAND, certified=0.01, largest=0.01, small_gain=0.047, searched="", states=5)
+    assert "by the small-gain bound, without a certificate, up to 47 ms is stable (small" in found.verdict
+    assert "small-gain" not in replace(found, small_gain=0.009).verdict
 
 
 def test_a_loop_that_is_unstable_by_itself_has_no_margin(system: System) -> None:
