@@ -26,7 +26,7 @@ NEAR, MOST = 2.0, 0.4
 HIGHEST = 2.0
 """Largest spectral radius that is drawn"""
 LEAST = 1e-12
-"""Least gain that is drawn"""
+"""Least gain that is drawn: less is rounding, as of a slow task beyond half its own rate"""
 
 
 def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
@@ -38,6 +38,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
         phase, loop = _phase(gain), result.loops[i] if result.stable else None
+        phase[np.abs(gain) < LEAST] = np.nan
         name = signal(output, {})
         label = f"{name}: {_sizes(loop)}" if several and loop is not None else name
         above.plot(result.frequencies, _decibels(np.abs(gain)), label=label, **how)
@@ -60,7 +61,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
 
 
 def _decibels(gain: Floats) -> Floats:
-    return np.asarray(20.0 * np.log10(np.maximum(gain, LEAST)))
+    return np.asarray(20.0 * np.log10(np.where(gain < LEAST, np.nan, gain)))
 
 
 def _sizes(loop: LoopMargins) -> str:

@@ -181,6 +181,9 @@ def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
     gain, *_ = found.plot()["bode"].axes  # its loop gain is drawn all the same
     assert gain.lines[0].get_ydata() == pytest.approx(20.0 * np.log10(np.abs(found.gains[0])))
     assert "unstable" in gain.get_title()
+    rounded = dataclasses.replace(found, gains=np.where(found.frequencies > 30.0, 1e-19, found.gains))
+    for axes in rounded.plot()["bode"].axes[:2]:  # what is zero but for rounding is not
+        assert np.array_equal(np.isnan(axes.lines[0].get_ydata()), found.frequencies > 30.0)
     with pytest.raises(UsageError, match=r"^step: expected a stable loop; the spectral radius of this one is 1\.04"):
         step(late)
 
