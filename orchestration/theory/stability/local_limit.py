@@ -87,7 +87,7 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
     slope = (growths[above] - growths[below]) / (above - below)
     difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE) - growths[below])
     wholes = [one.whole if isinstance(one, LiftedTangent) else one for _, _, one in known.values()]
-    precise = known_to(max(one.precision for one in wholes))
+    precise = known_to(max((one.precision for one in wholes), default=0.0))
     return replace(found, method=f"{LOOP}{precise}", accuracy=found.accuracy + difference / slope)
 
 
