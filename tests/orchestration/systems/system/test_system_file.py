@@ -82,7 +82,11 @@ def refusal(folder: Path, text: str) -> str:
 @pytest.mark.parametrize(
     ("right", "wrong", "line"),
     [
-        ("align =", "aling =", "components.tank.aling: no such key; expected one of fmu, parameters, step, sampling, "),
+        (
+            "align =",
+            "aling =",
+            "components.tank.aling: no such key; expected one of fmu, parameters, step, points, sampling, ",
+        ),
         ("jitter =", "jiter =", "components.controller.sampling.jiter: no such key; expected one of period, offset, "),
         ("delay =", "delai =", "connections.1.delai: no such key; expected one of name, from, to, order, delay, "),
         ("noise = 0.1", "nois = 0.1", "sources.rain.nois: no such key; expected one of to, constant, file, interp"),
