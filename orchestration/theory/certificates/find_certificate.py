@@ -20,7 +20,7 @@ MAX_INEQUALITIES = 1000
 """inequalities of a search: steps of the ladder that need more are skipped"""
 SEARCHED = 12
 """cells for which forms are searched; of two parameters the square root of that along each"""
-REFINEMENTS = {1: (2, 4, 8), 2: (2, 4)}
+REFINEMENTS = {0: (1,), 1: (2, 4, 8), 2: (2, 4)}
 """factors on the number of cells for the proof, by the number of parameters: cells are refined first, forms searched
 again second"""
 ROUNDS = 3
@@ -66,7 +66,7 @@ def _prove(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int
         forms = forms_for(certificate, parts)
         if forms is None:
             return None
-        for refinement in REFINEMENTS[max(1, *(len(letter.ranges) for letter in family.letters))]:
+        for refinement in REFINEMENTS[max(len(letter.ranges) for letter in family.letters)]:
             refined = replace(certificate, forms=forms, cells=tuple(_cells_of(family, labels, refinement)))
             try:
                 verified(refined)
