@@ -111,6 +111,10 @@ template <class T> struct quadcosim_kind {
 template <> struct quadcosim_kind<float> { static float of(double x) { return (float)x; } };
 template <> struct quadcosim_kind<double> { static double of(double x) { return x; } };
 template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
+template <class T> struct quadcosim_one { enum { is = 1 }; };
+template <class T> struct quadcosim_one<T *> { enum { is = 0 }; };
+template <class T, unsigned long N> struct quadcosim_one<T[N]> { enum { is = 0 }; };
+template <class T> struct quadcosim_one<T &> : quadcosim_one<T> {};
 extern "C" void quadcosim_init(void);
 extern "C" void quadcosim_after_parameters(void);
 extern "C" void quadcosim_step(void);
@@ -204,6 +208,10 @@ def _function(code: UserCode, name: str, body: Code | None) -> list[str]:
     return [f"void {name}(void) {{", *([] if body is None else _at(code, body)), "}"]
 
 
+_NUMBERS = sum(1 << kind for kind in (1, 2, 3, 4, 8))
+"""Arithmetic types by their number in `__builtin_classify_type`, which knows bit fields, too"""
+_IS_NUMBER = f"_Static_assert({_NUMBERS} >> __builtin_classify_type({{lvalue}}) & 1, {{told}});"
+_IS_NUMBER_CXX = "static_assert(quadcosim_one<decltype({lvalue})>::is, {told});"
 # No macros, in whose place an error would have no line of the user's.
 _TO_C = (
     "{{ const double quadcosim_x = {value}; "
@@ -221,8 +229,18 @@ def _each(code: UserCode, name: str, qualifier: str, places: Sequence[Place], fo
     yield "(void)quadcosim_values; (void)quadcosim_apart;"
     for number, place in enumerate(places):
         value = f"quadcosim_values[{number} * quadcosim_apart]"
-        yield from _at(code, place.lvalue, form.format(value=value, lvalue=place.lvalue.text))
+        check = (_IS_NUMBER_CXX if code.is_cxx else _IS_NUMBER).format(lvalue=place.lvalue.text, told=_refusal(place))
+        yield from _at(code, place.lvalue, check + form.format(value=value, lvalue=place.lvalue.text))
     yield "}"
+
+
+def _refusal(place: Place) -> str:
+    """What is wrong with an lvalue that is no number, as a literal of C."""
+    text = place.lvalue.text
+    return c_string(
+        f"{place.causality}s.{place.name} = {text} is an array, a pointer or a struct: expected one number, as "
+        f"{text}[0] or a field, and a name for each"
+    )
 
 
 def _at(code: UserCode, part: Code, text: str | None = None) -> list[str]:

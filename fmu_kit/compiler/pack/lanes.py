@@ -15,6 +15,8 @@ from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, Mathematics, co
 
 MAIN = "lanes.c"
 """The file to compile among the sources of an FMU."""
+USER_OBJECT = "code.o"
+"""The object of a user's own C among them."""
 MAX_LANES = 64
 _REGISTERS = {"__AVX512DQ__": 8, "__AVX__": 4}
 """Doubles in a vector register, by predefined macro of the compiler; without these, 2."""

@@ -20,7 +20,7 @@ from fmu_kit.compiler.pack.c_compiler import compiler, output_of
 SECTION = "quadcosim_state"
 _OPTIONS = (
     *("-O2", "-g1", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-strict-aliasing", "-fno-common"),
-    *("-U_FORTIFY_SOURCE", "-fdiagnostics-color=never", "-gno-record-gcc-switches"),
+    *("-Wall", "-U_FORTIFY_SOURCE", "-fdiagnostics-color=never", "-gno-record-gcc-switches"),
 )
 _LIBRARY = (".a", ".o")
 """Endings of sources that are compiled already, such as static libraries of Rust"""
@@ -41,6 +41,8 @@ class Objects:
     """whether it uses nothing outside of itself, so that its state is that section"""
     read: tuple[str, ...]
     """paths of the files that were compiled, those of the system aside"""
+    warnings: tuple[str, ...]
+    """warnings of the compiler, as PLACE: TEXT, those of what is unused last"""
 
 
 _MATHEMATICS = (
@@ -83,7 +85,7 @@ def build_objects(code: UserCode, user: Path, folder: Path) -> Objects:
 
     Raises `RefusedCodeError` naming the user's file and line, and `PackagingError` without a compiler.
     """
-    compiled, libraries, read = [], [], []
+    compiled, libraries, read, warnings = [], [], [], list[str]()
     for number, source in enumerate([*code.sources, str(user)]):
         path = Path(code.folder, source)
         if not path.is_file():
@@ -93,7 +95,8 @@ def build_objects(code: UserCode, user: Path, folder: Path) -> Objects:
             read.append(str(path))
             continue
         target = folder / f"{number}.o"
-        _run(code, [*_compiler_of(path), *_options(code, folder), "-MMD", "-c", path, "-o", target], folder)
+        said = _run(code, [*_compiler_of(path), *_options(code, folder), "-MMD", "-c", path, "-o", target], folder)
+        warnings += _warnings(code, said)
         read += [name for name in _prerequisites(target.with_suffix(".d")) if name != str(user)]
         compiled.append(target)
     joined = folder / "joined.o"
@@ -101,7 +104,8 @@ def build_objects(code: UserCode, user: Path, folder: Path) -> Objects:
     is_pure = _expect_usable(code, joined, folder)
     path, size = _with_one_section(joined, folder, has_lines=not libraries)
     relative = tuple(dict.fromkeys(str(Path(code.folder, name).resolve()) for name in read))
-    return Objects(path=path, state_bytes=size, is_pure=is_pure, read=relative)
+    told = sorted(dict.fromkeys(warnings), key=lambda text: "[-Wunused" in text)
+    return Objects(path=path, state_bytes=size, is_pure=is_pure, read=relative, warnings=tuple(told))
 
 
 def libraries(code: UserCode) -> list[str]:
@@ -136,9 +140,20 @@ def _run(code: UserCode, command: Sequence[object], folder: Path) -> str:
     try:
         return output_of([*map(str, command)], folder)
     except PackagingError as error:
-        said = str(error).partition(": ")[2].replace("<command-line>:", f"{code.file}: defines:")
-        text = re.sub(rf"({re.escape(code.file)}:\d+):\d+:", r"\1:", said)
-        raise RefusedCodeError(text.replace(f"{Path(code.folder).resolve()}/", "")) from error
+        raise RefusedCodeError(_in_users_words(code, str(error).partition(": ")[2])) from error
+
+
+def _in_users_words(code: UserCode, said: str) -> str:
+    """What the compiler says, with places as in the user's file and folder."""
+    said = said.replace("<command-line>:", f"{code.file}: defines:").replace(f"{Path(code.folder).resolve()}/", "")
+    said = re.sub(rf"({re.escape(code.file)}:\d+):\d+:", r"\1:", said)
+    return re.sub(r"static assertion failed: \"?(.*?)\"?$", r"\1", said)
+
+
+def _warnings(code: UserCode, said: str) -> list[str]:
+    """The compiler's warnings about lines of the user, as PLACE: TEXT."""
+    found = re.findall(r"^(?!user_code:)(.+:\d+): warning: (.+)$", said, re.MULTILINE)
+    return [_in_users_words(code, f"{place}: {text}") for place, text in found]
 
 
 def _expect_usable(code: UserCode, joined: Path, folder: Path) -> bool:

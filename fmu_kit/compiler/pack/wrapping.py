@@ -27,7 +27,7 @@ from fmu_kit.compiler.emit.tables import tables
 from fmu_kit.compiler.emit.user_code import Code, Place, Task, UserCode, places, texts, user_code
 from fmu_kit.compiler.pack import c_compiler
 from fmu_kit.compiler.pack.freshness import wrapping_hash
-from fmu_kit.compiler.pack.lanes import MAIN
+from fmu_kit.compiler.pack.lanes import MAIN, USER_OBJECT
 from fmu_kit.compiler.pack.user_objects import Objects, RefusedCodeError, build_objects, libraries
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.interface import FixedParameter, Input, Output
@@ -85,6 +85,8 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
         (folder / user.name).write_text(user_code(code), encoding="utf-8")
         objects = build_objects(code, user, folder)
         (folder / "probe.c").write_text(_PROBE, encoding="utf-8")
+        for warning in objects.warnings:
+            print(warning, file=sys.stderr)
         starts = _starts(code, objects, folder)
         slave = _slave(code, starts)
         whole = objects.is_pure and not systems
@@ -101,10 +103,10 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
             files |= _lanes(texts_, objects)
         files |= _licensed(code)
         guid = content_guid({**files, **{f"c/{name}": text.encode() for name, text in texts_.items()},
-                             "c/code.o": objects.path.read_bytes()})  # fmt: skip
+                             f"c/{USER_OBJECT}": objects.path.read_bytes()})  # fmt: skip
         texts_["tables.h"] = texts_["tables.h"].replace(GUID_PLACEHOLDER, guid)
         files["modelDescription.xml"] = description.replace(GUID_PLACEHOLDER.encode(), guid.encode())
-        sources = {name: text.encode() for name, text in texts_.items()} | {"code.o": objects.path.read_bytes()}
+        sources = {name: text.encode() for name, text in texts_.items()} | {USER_OBJECT: objects.path.read_bytes()}
         files[c_compiler.library_path(here, code.name)] = _library(code, sources, standard.main)
         for system in systems:
             for name, library in _elsewhere(code, system, texts_, standard, folder).items():
@@ -114,7 +116,7 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
 
 
 def _library(code: UserCode, sources: Mapping[str, bytes], main: str) -> bytes:
-    options = [*c_compiler.OF_LIBRARY, "-Wl,-Bsymbolic", "-Wl,-z,defs", "code.o", *libraries(code)]
+    options = [*c_compiler.OF_LIBRARY, "-Wl,-Bsymbolic", "-Wl,-z,defs", USER_OBJECT, *libraries(code)]
     return c_compiler.compiled_here(sources, main, options=options, has_lines=True)
 
 
@@ -235,7 +237,7 @@ def _record(code: UserCode, objects: Objects) -> dict[str, bytes]:
 
 def _lanes(texts_: Mapping[str, str], objects: Objects) -> dict[str, bytes]:
     """What the lanes of many runs at once are compiled from."""
-    files = {name: texts_[name].encode() for name in _OF_LANES} | {"code.o": objects.path.read_bytes()}
+    files = {name: texts_[name].encode() for name in _OF_LANES} | {USER_OBJECT: objects.path.read_bytes()}
     files |= {MAIN: (FOLDER / MAIN).read_bytes(), "lane_functions.h": (FOLDER / "wrapped_lanes.h").read_bytes()}
     return {f"{archive.LANES_FOLDER}{name}": content for name, content in files.items()}
 

@@ -18,6 +18,7 @@ k_p = "pd_kp"                     # start values are read from the code after in
 import hashlib
 import json
 import keyword
+import logging
 import re
 import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -40,6 +41,9 @@ WHAT = "file of a controller in C"
 _DEGREES = re.compile("deg|°")
 REFUSED = 2
 """Exit code of the packer for code that cannot be wrapped as it is"""
+MOST_WARNINGS = 10
+"""The most of the compiler's warnings that are shown"""
+_NOTES = logging.getLogger("quadcosim")
 
 
 @record()
@@ -226,11 +230,16 @@ def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None
         subprocesses.command("fmu_kit.compiler.pack.wrapping", out.resolve(), version, systems or ""),
         input=content, capture_output=True, text=True, errors="replace", env=subprocesses.environment(), check=False,
     )  # fmt: skip
-    if done.returncode != 0:
-        said = (done.stderr.strip().splitlines() or ["no output"])[-1]
-        if done.returncode == REFUSED:
-            raise UsageError(str(path.parent / said))
+    lines = done.stderr.strip().splitlines()
+    said = "" if done.returncode == 0 else lines.pop() if lines else "no output"
+    if done.returncode not in (0, REFUSED):
         raise QuadcosimError(f"building {out} failed: {said}")
+    for line in lines[:MOST_WARNINGS]:
+        _NOTES.warning("warning: %s", path.parent / line)
+    if len(lines) > MOST_WARNINGS:
+        _NOTES.warning("warning: and %d more of the compiler", len(lines) - MOST_WARNINGS)
+    if said:
+        raise UsageError(str(path.parent / said))
     return out
 
 

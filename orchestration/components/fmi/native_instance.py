@@ -431,6 +431,8 @@ class NativeInstance(Instance):
         diverged = [m for m in self._messages if m[0] > slaves.WARNING and m[1] == DIVERGENCE_CATEGORY]
         silent = f"returned {slaves.status_name(self.model.version, status)}, without a message"
         summary, details = slaves.failure_text(diverged or self._messages, otherwise or self.problem() or silent)
+        if diverged and summary.partition(" = ")[0] in self.model.variables:
+            return SimulatorError(f"{self.name}.{summary}", divergence=True, details=details)
         if not diverged and self._names_initial_value(summary):
             return RefusedValueError(f"{self.name}.{summary}", details=details)
         return SimulatorError(self.reported(function, summary), divergence=bool(diverged), details=details)

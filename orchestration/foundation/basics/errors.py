@@ -45,9 +45,8 @@ class SimulatorError(QuadcosimError):
         """The `Result` so far of the run that it ended; None if nothing was recorded."""
 
     def timed(self, t: float) -> None:
-        """Add the time [s] of the run at which it was raised, unless its text is that of a divergence."""
-        if not self.divergence:
-            self.args = (f"{self.args[0]}, at t = {t:g} s",)
+        """Add the time [s] of the run at which it was raised."""
+        self.args = (f"{self.args[0]}, at t = {t:g} s",)
 
 
 class StoppedStepError(SimulatorError):

@@ -341,10 +341,10 @@ def test_divergence_is_a_result(main: Main) -> None:
     [
         (
             [f"plant.inertia.{axes}=1e-90" for axes in ("xx", "yy", "zz")],
-            "plant (QuadrotorPlant): fmi2DoStep: ",
+            "plant.",
             0.001,
         ),
-        (["controller.gain.translation.x=1e308"], "controller (UnifiedController): fmi2GetReal: ", 0.0),
+        (["controller.gain.translation.x=1e308"], "controller.", 0.0),
     ],
 )
 def test_an_fmu_that_reports_divergence_gives_a_result(

@@ -7,7 +7,7 @@ from pathlib import Path
 from fmu_kit import libraries
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import Unit, linked_for_wasm
-from fmu_kit.compiler.pack.lanes import MAIN
+from fmu_kit.compiler.pack.lanes import MAIN, USER_OBJECT
 from fmu_kit.compiler.runtime import FOLDER
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.batch.kernels import FILES, sources_of
@@ -43,8 +43,11 @@ def units_of(tables: SystemTables, lanes: int) -> list[Unit]:
 def _component(i: int, tables: SystemTables, defined: tuple[str, ...]) -> Unit:
     name = tables.shape.names[i]
     sources = dict(sources_of(name, tables.shape.models[name]))
-    if _FUNCTIONS not in sources:
-        raise UsageError(f"components.{name}: a user's own C, compiled for this machine, does not run in a page")
+    if USER_OBJECT in sources:
+        raise UsageError(
+            f"components.{name}: its C is compiled for this machine, and does not run in a page: expected a component "
+            "in Python, as from quadcosim new controller NAME"
+        )
     sources[_FUNCTIONS] = _specialised(sources[_FUNCTIONS].decode(), _fixed(name, tables)).encode()
     renamed = tuple(f"-Dquadcosim_{each}=c{i}_{each}" for each in _OF_COMPONENTS)
     is_alone = tables.shape.lanes == 1 and list(tables.shape.wires.continuous) == [i]

@@ -241,6 +241,11 @@ def test_it_is_made_again_when_a_header_changes_only(of: Callable[..., Path], pd
         ("pd_init();", "pd_init()", "pd.toml:7: error: expected ';' before '}' token"),
         ('"pd_step(&in, &out);"', "'''\npd_step(&in, &out);\nno;\n'''", "pd.toml:10: error: 'no' undeclared"),
         ('include = ["."]', 'include = ["."]\ndefines = ["double=5"]', "pd.toml: defines: error: expected"),
+        (
+            '"in.x"',
+            '"in"',
+            "pd.toml:10: error: inputs.x = in is an array, a pointer or a struct: expected one number, as",
+        ),
         ('["pd.h"]', '["no.h"]', "pd.toml:4: fatal error: no.h: No such file or directory"),
     ],
 )
@@ -300,10 +305,13 @@ def test_the_command_ends_with_2_for_a_refused_source_and_makes_fmus(of: Callabl
     assert f"{file.parent}/pd.toml:10: error: 'pd_in' has no member named 'q'" in main("wrap", file, code=2).stderr
     code = main("wrap", file.with_suffix(".c"), code=2).stderr
     assert f"{file.with_suffix('.c')}: expected the .toml file that describes the code, as from quadcosim new" in code
-    of()
-    made = main("wrap", file, "--fmi", "3", "--out", file.parent / "x").stdout.strip()
-    assert made == str(file.parent / "x" / "Pd.fmu")
-    assert read_model(Path(made)).version == 3
+    of(pd_c=PD_C + "static int " + ", ".join(f"i{k}" for k in range(12)) + ";\nint f(void) { int i; return i; }\n")
+    done = main("wrap", file, "--fmi", "3", "--out", file.parent / "x")
+    assert done.stdout.strip() == str(file.parent / "x" / "Pd.fmu")
+    assert read_model(Path(done.stdout.strip())).version == 3
+    first, *_, last = warned = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+    assert first == f"warning: {file.parent}/pd.c:6:29: 'i' is used uninitialized [-Wuninitialized]"
+    assert (len(warned), last) == (wrap.MOST_WARNINGS + 1, "warning: and 3 more of the compiler")
 
 
 LAW = """\

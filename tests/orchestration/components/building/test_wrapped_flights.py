@@ -6,6 +6,7 @@ import re
 import sqlite3
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,13 @@ from orchestration.components.building import builder
 from orchestration.components.building.models import CONTROLLERS, MODELS
 from orchestration.components.fmi.read_description import read_model
 from orchestration.components.scaffold.folder import write
+from orchestration.experiments.live.live import live
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.simulation.requests.one_fmu import alone
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.model import Criterion
 from quadcosim import FmuChoice, Scenario, UsageError, bode, changed, load_study, load_system, margin
 from tests.commands import Main
 from tests.extent import in_test_all, sample
@@ -71,6 +74,18 @@ def test_a_run_at_another_period_warns_and_at_its_own_does_not(integrator: Path)
     )
     (told,) = run(alone(integrator.with_name("Pd.fmu"), interval=0.2, stop_time=1.0)).warnings
     assert told.startswith("Pd (Pd): is sampled every 0.2 s, but its code believes 0.05 s")
+
+
+def test_a_verdict_names_the_time_and_the_output_that_is_not_finite(integrator: Path) -> None:
+    gains = {f"components.controller.parameters.k_{each}": 1e308 for each in "pd"}
+    system = replace(changed(load_system(integrator), gains), criterion=Criterion(diverged="abs(plant.x) > 1e307"))
+    (told,) = {run(system, engine=each).divergence for each in ("python", "compiled")}
+    assert told == "controller.u = inf: expected a finite value, at t = 0.05 s"
+
+
+def test_a_page_refuses_it_before_anything_is_compiled(integrator: Path) -> None:
+    with pytest.raises(UsageError, match=r"^components\.controller: its C is compiled for this machine, and does not"):
+        live(load_system(integrator))
 
 
 def test_a_task_of_a_computer_at_another_period_warns(integrator: Path) -> None:

@@ -4,8 +4,6 @@ from typing import Any
 
 import pytest
 
-from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.engines.wasm import modules
 from orchestration.simulation.engines.wasm.tables_of_system import tables_of
 from orchestration.simulation.requests.request import request_of
 from quadcosim import ReferenceChoice, Scenario, fly
@@ -127,12 +125,6 @@ def test_motions_of_sums_and_products_are_computed_by_a_page_under_any_clock():
     of = tables(request, 1)
     flown = fly(request, {"timing.period": [0.013]}, record=COLUMNS)
     assert hashes(page_of(of), [{"timing.period": 0.013}]) == hashes_of(flown, COLUMNS)
-
-
-def test_c_of_a_user_is_refused_by_the_name_of_its_component(of_one_lane, monkeypatch):
-    monkeypatch.setattr(modules, "sources_of", lambda name, model: {"lanes.c": b"", "law.o": b""})
-    with pytest.raises(UsageError, match=r"components\.plant: a user's own C"):
-        modules.units_of(of_one_lane, 1)
 
 
 def test_settings_have_a_place_each(of_one_lane):
