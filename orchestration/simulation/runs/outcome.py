@@ -107,7 +107,8 @@ def result_of(
     engine = outcome.provenance["engine"]
     _NOTES.debug("%d steps to t = %g s by the %s loop in %.3f s", outcome.steps, outcome.end, engine, wall_time)
     if interrupted:
-        raise RunInterrupted(f"at t = {outcome.end:g} s of {resolved.system.stop_time:g} s", result)
+        why = "" if outcome.failure is None else f": {outcome.failure}"
+        raise RunInterrupted(f"at t = {outcome.end:g} s of {resolved.system.stop_time:g} s{why}", result)
     if outcome.failure is not None:
         outcome.failure.result = result
         raise outcome.failure

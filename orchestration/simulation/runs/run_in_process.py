@@ -26,6 +26,8 @@ from orchestration.systems.system.request import Request
 _MESSAGES = logging.getLogger("quadcosim")
 _PATIENCE = 5.0
 """Time in which the process must end after its last message [s]"""
+PATIENCE_OF_CALL = 5.0
+"""Time in which a call of an FMU must return after Ctrl-C [s]"""
 _REPORTS = ("describe", "begin", "take", "share", "message", "stage", "outcome", "error", "crash", "end")
 """Methods of `_Receiver` that a message may name"""
 
@@ -64,13 +66,19 @@ def simulate(
 
                 def apply_limits() -> None:
                     child.allow(time_limit)
-                    interrupt.forward(child.interrupt)
+                    interrupt.forward(stop)
+
+                def stop() -> None:
+                    child.interrupt()
+                    child.allow(PATIENCE_OF_CALL)
 
                 receiver = _Receiver(recorder, progress, apply_limits)
                 ending = receiver.receive_all(child, order)
             outcome = receiver.run_outcome
             if outcome is None:
-                outcome = _lost(resolved, receiver, folder.path, ending or "ended")
+                late = f"did not end within {PATIENCE_OF_CALL:g} s of Ctrl-C"
+                is_late = interrupt.requested and receiver.out_of_time
+                outcome = _lost(resolved, receiver, folder.path, late if is_late else ending or "ended")
             elif not receiver.is_over:
                 return None
             elif ending is not None:
@@ -88,6 +96,8 @@ class _Receiver:
         self.run_outcome: RunOutcome | None = None
         self.is_over = False
         """whether the run is over"""
+        self.out_of_time = False
+        """whether a limit of time has ended the process"""
         self.activity = ""
         """Activity of the process"""
         self.components: Sequence[str] = ()
@@ -108,7 +118,7 @@ class _Receiver:
                     child.close(_PATIENCE)
                     return None
         except Died as death:
-            reached = death.ending.reached
+            reached, self.out_of_time = death.ending.reached, death.ending.out_of_time
             return str(death) if reached is None else f"was ended: {reached}"
 
     def describe(self, about: dict[str, dict[str, str]]) -> None:

@@ -16,7 +16,8 @@ import pytest
 
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.processes import subprocesses
-from orchestration.simulation.runs.outcome import RunLost
+from orchestration.simulation.runs import run_in_process
+from orchestration.simulation.runs.outcome import RunInterrupted, RunLost
 from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.run_directory import load_run
 from orchestration.simulation.runs.simulation import run
@@ -181,6 +182,19 @@ def test_an_fmu_that_does_not_return_is_ended_at_the_time_limit(waits: str, lost
     assert str(error) == f"the process of the run {why}, in a call of it (Small), after t = 0.05 s of 0.1 s"
     assert error.result is not None
     assert len(error.result.rows) == 6
+
+
+def test_an_fmu_that_does_not_return_after_ctrl_c_is_ended_and_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_in_process, "PATIENCE_OF_CALL", 0.2)
+    path = small(tmp_path, f"ENDS=kill({os.getpid()}, SIGINT); for (;;) pause()")
+    with pytest.raises(RunInterrupted) as raised:
+        run(alone(path))
+    where = "in a call of it (Small), after t = 0.05 s of 0.1 s"
+    why = f"the process of the run did not end within 0.2 s of Ctrl-C, {where}"
+    assert str(raised.value) == f"at t = 0.05 s of 0.1 s: {why}"
+    assert len(raised.value.result.rows) == 6
 
 
 def test_an_fmu_that_takes_too_much_memory_is_ended(lost: Callable[..., RunLost]) -> None:
