@@ -79,9 +79,11 @@ def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:
 def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str, tuple[str, ...]]:
     """The variables to record of each component beside exchanged ones: its `record`, or all outputs and local Reals.
 
-    Without `record`, constants are left out. A variable in an expression is recorded in any case.
+    Without `record`, constants are left out. A variable in an expression, by its name or as a part of a vector, is
+    recorded in any case.
     """
-    named = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    texts = {name for _, expression in expressions(system) for name in names(parse(expression))}
+    named = texts.union(f"{name}.{axis}" for name in texts for axis in "xyzw")
     found = {}
     for name, component in system.components.items():
         model = models[name]

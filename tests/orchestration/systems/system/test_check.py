@@ -48,10 +48,11 @@ diverged = "controller.valve and tank.level > 5"
 """
 
 
-def checked(folder: Path, text: str) -> None:
+def checked(folder: Path, text: str) -> dict[str, tuple[str, ...]]:
+    """What is recorded of each component."""
     described(
         folder, "Tank", inputs={"valve": "Real", "inflow": "Real"},
-        outputs={"level": "Real m", "name": "String", "count": "Integer"},
+        outputs={"level": "Real m", "name": "String", "count": "Integer", "flow.x": "Real", "flow.y": "Real"},
         parameters={"area": "Real", "rough": "Boolean", "pipes": "Integer"},
     )  # fmt: skip
     described(
@@ -62,12 +63,24 @@ def checked(folder: Path, text: str) -> None:
     system = load_system(folder / "system.toml")
     models = {name: read_model(Path(component.fmu)) for name, component in system.components.items()}
     check(system, models)
-    signals = {f"{name}.{each}" for name, variables in recorded_variables(system, models).items() for each in variables}
+    recorded = recorded_variables(system, models)
+    signals = {f"{name}.{each}" for name, variables in recorded.items() for each in variables}
     objectives.with_available_objectives(system, signals, set())
+    return recorded
 
 
 def test_a_valid_system_is_accepted(tmp_path: Path) -> None:
     checked(tmp_path, TANK)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "recorded"), [([], ["level", "flow.x", "flow.y"]), (["flow.y"], ["flow.y", "level", "flow.x"])]
+)
+def test_a_vector_in_an_expression_is_recorded_whole_whatever_is_chosen(
+    chosen: list[str], recorded: list[str], tmp_path: Path
+) -> None:
+    text = TANK.replace("step = 0.01", f"step = 0.01\nrecord = {chosen}").replace("tank.level)", "norm(tank.flow))")
+    assert checked(tmp_path, text)["tank"] == (*recorded,)
 
 
 @pytest.mark.parametrize("stated", ["scale = 1.0", "offset = 0.0", "scale = 1000.0"])
