@@ -80,6 +80,8 @@ class UserCode:
     sources: tuple[str, ...]
     include: tuple[str, ...]
     defines: tuple[str, ...]
+    sanitize: bool
+    """whether what C leaves undefined traps"""
     headers: tuple[Code, ...]
     declare: Code | None
     init: Code | None

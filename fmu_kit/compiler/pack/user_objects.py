@@ -22,6 +22,11 @@ _OPTIONS = (
     *("-O2", "-g1", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-fno-strict-aliasing", "-fno-common"),
     *("-Wall", "-U_FORTIFY_SOURCE", "-fdiagnostics-color=never", "-gno-record-gcc-switches"),
 )
+# Traps need no library of the compiler's; that for addresses would have to be the first in the process.
+_CHECKS = (
+    "-fsanitize=bounds-strict,shift,integer-divide-by-zero,signed-integer-overflow,float-cast-overflow",
+    "-fsanitize-undefined-trap-on-error",
+)
 _LIBRARY = (".a", ".o")
 """Endings of sources that are compiled already, such as static libraries of Rust"""
 
@@ -127,7 +132,13 @@ def _options(code: UserCode, folder: Path) -> list[str]:
     include = [f"-I{Path(code.folder, path).resolve()}" for path in code.include]
     # The same bytes wherever the code is and wherever it is compiled.
     named = [f"-ffile-prefix-map={path}=." for path in (code.folder, Path(code.folder).resolve(), folder.resolve())]
-    return [*_OPTIONS, *named, *include, *(f"-D{define}" for define in code.defines)]
+    return [
+        *_OPTIONS,
+        *(_CHECKS if code.sanitize else ()),
+        *named,
+        *include,
+        *(f"-D{define}" for define in code.defines),
+    ]
 
 
 def _prerequisites(rule: Path) -> list[str]:

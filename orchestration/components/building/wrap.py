@@ -100,6 +100,8 @@ class WrapFile:
     """Definitions of the preprocessor, as `NDEBUG` or `RATE=100`."""
     headers: tuple[str, ...] = ()
     """Headers that the statements need."""
+    sanitize: bool = False
+    """Whether the code is checked while it runs: an index out of bounds and its like are crashes that name the line."""
     description: str = ""
     """Description of the FMU, in one line."""
     author: str = ""
@@ -353,7 +355,7 @@ def description_of(path: Path) -> dict[str, Any]:
     }
 
 
-_UNCHANGED = ("name", "description", "author", "license", "sources", "include", "defines")
+_UNCHANGED = ("name", "description", "author", "license", "sources", "include", "defines", "sanitize")
 
 
 def _line_of(lines: Sequence[str], table: str, key: str, number: int = 0) -> int:

@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Callable
 from typing import Any
 
-_SIGNALS = (signal.SIGSEGV, signal.SIGFPE, signal.SIGILL)
+_SIGNALS = ("SIGSEGV", "SIGFPE", "SIGILL", "SIGTRAP")
 _WITH_CONTEXT = 4
 """SA_SIGINFO of signal.h"""
 _COUNTER = {"x86_64": 168, "aarch64": 440}
@@ -69,8 +69,8 @@ def report_crashes(report: Callable[[str], None]) -> None:
     handler = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(crashed)
     _KEPT.append(handler)
     action = _Action(handler=ctypes.cast(handler, ctypes.c_void_p), flags=_WITH_CONTEXT)
-    for number in _SIGNALS:
-        libc.sigaction(number, ctypes.byref(action), None)
+    for name in _SIGNALS:
+        libc.sigaction(getattr(signal, name), ctypes.byref(action), None)
 
 
 def _word(address: int) -> int:

@@ -306,18 +306,20 @@ def test_a_crash_in_the_c_is_one_line_with_its_signal_and_its_place(integrator: 
     file, step = integrator.with_name("pd.toml"), "pd_step(&in, &out);"
     file.with_name("bad.c").write_text("int pd_n;\n\nvoid pd_bad(volatile int *to)\n{\n    *to = pd_n;\n}\n")
     changes = {
-        "extern void pd_bad(volatile int *); if (n++ == 3) pd_bad(0);": "bad.c:5 (pd_bad)",
-        "static char *none; if (n++ == 3) { __builtin_memcpy(none, &n, 99999); n = 0; }": "bad.toml:8",
-        "static void (*none)(void); if (n++ == 3) { none(); n = 0; }": "bad.toml:8",
+        "extern void pd_bad(volatile int *); if (n++ == 3) pd_bad(0);": ("SIGSEGV", "bad.c:5 (pd_bad)"),
+        "static char *none; if (n++ == 3) { __builtin_memcpy(none, &n, 99999); n = 0; }": ("SIGSEGV", "bad.toml:8"),
+        "static void (*none)(void); if (n++ == 3) { none(); n = 0; }": ("SIGSEGV", "bad.toml:8"),
+        "static struct { int of[3]; } all; all.of[n++] = 1;": ("SIGILL", "bad.toml:9"),
     }
-    for change, place in changes.items():
-        text = file.read_text().replace(step, f"static int n; {change} {step}").replace('"Pd"', '"Bad"')
+    for change, (died, place) in changes.items():
+        checked = '"Bad"\nsanitize = true' if died == "SIGILL" else '"Bad"'
+        text = file.read_text().replace(step, f"static int n; {change} {step}").replace('"Pd"', checked)
         file.with_name("bad.toml").write_text(text.replace('"pd.c"', '"pd.c", "bad.c"'))
         system = integrator.with_name("bad_system.toml")
         system.write_text(integrator.read_text().replace("pd.toml", "bad.toml"))
         done = main("run", system, "--build", code=1)
         (line,) = [line for line in done.stderr.splitlines() if line.startswith("quadcosim:")]
-        assert f"SIGSEGV, in a call of controller (Bad), at {place}, after t = " in line
+        assert f"{died}, in a call of controller (Bad), at {place}, after t = " in line
 
 
 @pytest.fixture(scope="module")
