@@ -84,5 +84,7 @@ def test_all_that_has_axes_is_turned_but_what_there_is_along_axes_of_the_body(sl
     along = ("gain", "limit")
     with_axes = [each for each in slave._declared if isinstance(each.start, Vec3 | Quaternion | Inertia)]
     untold = [each.name for each in with_axes if each.frame is None]
-    assert [name for name in untold if not name.startswith(along)] == []
+    forgotten = [name for name in untold if not name.startswith(along)]
+    package = slave.__module__.rpartition(".")[0].replace(".", "/")
+    assert forgotten == [], f"{package}: expected `frame=`, one of fmu_kit/frames.py, at the declaration of {forgotten}"
     assert len(with_axes) > len(untold)
