@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -9,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.results.units import unit_of
 from orchestration.systems.expressions.over_run import Recorded, evaluate, reductions
 from orchestration.systems.expressions.reductions import REDUCTIONS
 from orchestration.systems.expressions.syntax import parse
+from tests.orchestration.systems.expressions.test_units import defined
 
 TIME = np.array([0.0, 0.5, 1.0, 3.0])
 LINEAR = np.array([0.0, 1.0, 2.0, 6.0])
@@ -35,39 +38,46 @@ def value(expression: str, recorded: Recorded | None = None):
     return evaluate({"x": parse(expression)}, lambda: iter([whole]))["x"]
 
 
+METRE = defined("m", m=1)
+UNITS = dict.fromkeys(("tank.level", "valve.u", "p.x", "p.y", "p.z"), METRE) | {"tank.area": METRE.power(Fraction(2))}
 KNOWN = [
-    ("max(tank.level)", 6.0),
-    ("min(valve.u)", -2.0),
-    ("first(tank.level)", 0.0),
-    ("last(valve.u)", 3.0),
-    ("mean(tank.level)", 3.0),
-    ("integral(tank.level)", 9.0),
-    ("integral(valve.u)", 0.5 * 1.0 + 0.5 * -2.0 + 2.0 * 3.0),
-    ("integral(valve.u ** 2)", 0.5 * 1.0 + 0.5 * 4.0 + 2.0 * 9.0),
-    ("rms(valve.u)", math.sqrt((0.5 * 1.0 + 0.5 * 4.0 + 2.0 * 9.0) / 3.0)),
-    ("total_variation(valve.u)", 3.0 + 5.0),
-    ("total_variation(tank.level)", 6.0),
-    ("share(valve.u < 0)", 0.5 / 3.0),
-    ("peak_time(valve.u)", 1.0),
-    ("settling_time(valve.u - 3, 0.1)", 1.0),
-    ("settling_time(tank.level, 10)", 0.0),
-    ("settling_time(tank.level, 6)", 0.0),
-    ("max(tank.level) / tank.area", 3.0),
-    ("max(norm(p))", 6.0 * math.sqrt(2.0)),
-    ("max(norm(p - p))", 0.0),
-    ("max(norm(p.x, p.y))", 6.0 * math.sqrt(2.0)),
-    ("mean(sampled(command, valve.u))", (1.0 + 3.0 + 3.0) / 3.0),
-    ("share(sampled(command, valve.u > 2))", 2.0 / 3.0),
-    ("growth_share(sampled(command, valve.u), 0.5)", 0.5),
-    ("max(tank.level * (time >= stop_time / 2))", 6.0),
-    ("max(max(tank.level, valve.u))", 6.0),
-    ("max(tank.level) > 5 and not min(tank.level) > 0", 1.0),
+    ("max(tank.level)", 6.0, "m"),
+    ("min(valve.u)", -2.0, "m"),
+    ("first(tank.level)", 0.0, "m"),
+    ("last(valve.u)", 3.0, "m"),
+    ("mean(tank.level)", 3.0, "m"),
+    ("integral(tank.level)", 9.0, "m.s"),
+    ("integral(valve.u)", 0.5 * 1.0 + 0.5 * -2.0 + 2.0 * 3.0, "m.s"),
+    ("integral(valve.u ** 2)", 0.5 * 1.0 + 0.5 * 4.0 + 2.0 * 9.0, "m2.s"),
+    ("rms(valve.u)", math.sqrt((0.5 * 1.0 + 0.5 * 4.0 + 2.0 * 9.0) / 3.0), "m"),
+    ("total_variation(valve.u)", 3.0 + 5.0, "m"),
+    ("total_variation(tank.level)", 6.0, "m"),
+    ("share(valve.u < 0)", 0.5 / 3.0, "1"),
+    ("peak_time(valve.u)", 1.0, "s"),
+    ("settling_time(valve.u - 3, 0.1)", 1.0, "s"),
+    ("settling_time(tank.level, 10)", 0.0, "s"),
+    ("settling_time(tank.level, 6)", 0.0, "s"),
+    ("max(tank.level) / tank.area", 3.0, "1/m"),
+    ("max(norm(p))", 6.0 * math.sqrt(2.0), "m"),
+    ("max(norm(p - p))", 0.0, "m"),
+    ("max(norm(p.x, p.y))", 6.0 * math.sqrt(2.0), "m"),
+    ("mean(sampled(command, valve.u))", (1.0 + 3.0 + 3.0) / 3.0, "m"),
+    ("share(sampled(command, valve.u > 2))", 2.0 / 3.0, "1"),
+    ("growth_share(sampled(command, valve.u), 0.5)", 0.5, "1"),
+    ("max(tank.level * (time >= stop_time / 2))", 6.0, "m"),
+    ("max(max(tank.level, valve.u))", 6.0, "m"),
+    ("max(tank.level) > 5 and not min(tank.level) > 0", 1.0, "1"),
 ]
 
 
-@pytest.mark.parametrize(("expression", "expected"), KNOWN)
-def test_functions_have_known_values(expression, expected):
+@pytest.mark.parametrize(("expression", "expected", "unit"), KNOWN)
+def test_functions_have_known_values_and_units(expression, expected, unit):
     assert value(expression) == pytest.approx(expected, rel=1e-14)
+    found = unit_of(parse(expression), UNITS)
+    assert str(found) == unit, (
+        f"{expression} is in {found}: expected {unit}, as KNOWN has it, by `unit=` of its row of REDUCTIONS in "
+        f"orchestration/systems/expressions/reductions.py"
+    )
 
 
 @pytest.mark.parametrize(
@@ -126,7 +136,7 @@ EVERYTHING = {
 
 @pytest.mark.parametrize(
     ("nodes", "table"),
-    [([parse(text) for text, _ in KNOWN], "KNOWN"), ([*EVERYTHING.values()], "EVERYTHING")],
+    [([parse(text) for text, *_ in KNOWN], "KNOWN"), ([*EVERYTHING.values()], "EVERYTHING")],
     ids=["with its value", "in spans"],
 )
 def test_every_reduction_is_tested(nodes, table):
