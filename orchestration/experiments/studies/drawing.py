@@ -54,7 +54,7 @@ def draw_study(
     drawn, indices = study_figures(study, path, metric, style)
     place = path.parent if out is None else out
     with new_files(place) as new:
-        tables = [sensitivity.write(indices, (new / next(iter(drawn))).with_suffix(".csv"))] if indices else []
+        tables = [sensitivity.write(indices, new / f"{next(iter(drawn))}.csv")] if indices else []
         written = [*tables, *save(drawn, new, style, progress)]
     return [place / each.name for each in written]
 

@@ -1,6 +1,7 @@
 """Sensitivity indices of functions whose indices are known, and of a study that was run."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from orchestration.experiments.studies.drawing import draw_study, indices_of, nu
 from orchestration.experiments.studies.sensitivity import Index, SensitivityMethod, analyse, shares
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.style import SCREEN
 from quadcosim import UsageError
 from tests.orchestration.experiments.studies.common import axis, short, study, swept
 
@@ -121,6 +123,9 @@ def test_a_finished_screening_gives_a_table_and_a_figure(flown: tuple[Study, Pat
     ]  # fmt: skip
     assert (read["value"][:2] > 0.0).all()
     assert figure.read_bytes().startswith(b"\x89PNG")
+    metrics = ("control_effort.torque", "control_effort.thrust")
+    named = [draw_study(chosen, folder, metric, replace(SCREEN, formats=("png",)))[0].name for metric in metrics]
+    assert named == [f"sensitivity_{metric}.csv" for metric in metrics]
 
 
 def test_the_indices_belong_to_the_design_that_was_run(flown: tuple[Study, Path]) -> None:
