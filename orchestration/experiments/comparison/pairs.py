@@ -32,7 +32,7 @@ class Pair:
     only_other: int
     neither: int
     settles: int
-    """Number that only it settles minus the number that only the other settles, among those that both survive"""
+    """Number from which it settles minus the number from which the other settles; one that diverges does not settle"""
     error: Median
     effort: Median
     """medians of the ratio of its value to that of the first where both survive; the intervals hold for all pairs of
@@ -66,7 +66,7 @@ def _pair(
     known = it.index.intersection(other.index)
     mine, its = survived(it.loc[known]), survived(other.loc[known])
     both = known[mine & its]
-    ahead = settled(it.loc[both]).astype(int) - settled(other.loc[both]).astype(int)
+    ahead = settled(it.loc[known]).sum() - settled(other.loc[known]).sum()
     ratios = [
         Median.of((it.loc[both, metric] / other.loc[both, metric]).to_numpy(float), confidence)
         for metric in (comparison.front.error, comparison.front.effort)
@@ -81,7 +81,7 @@ def _pair(
         only_it=int((mine & ~its).sum()),
         only_other=int((~mine & its).sum()),
         neither=int((~mine & ~its).sum()),
-        settles=int(ahead.sum()),
+        settles=int(ahead),
         error=ratios[0],
         effort=ratios[1],
     )
