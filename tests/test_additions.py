@@ -10,6 +10,7 @@ import typer.main
 
 from orchestration.command.cli import app
 from orchestration.components.building.models import MODELS
+from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.simulation.engines.batch.folds import LANES
 from orchestration.simulation.figures.views import VIEWS
 from orchestration.systems.expressions.operators import OPERATORS
@@ -19,6 +20,7 @@ from tests.slaves import get, put
 
 PAGES = {path: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))}
 TESTS = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+OF_METRICS = ROOT / "tests/orchestration/quadrotor/scenarios/test_metrics.py"
 DRAWN = "".join(
     path.read_text(encoding="utf-8")
     for name in ("figures", "schedule")
@@ -109,6 +111,13 @@ def test_a_page_and_a_test_have_every_command(name: str) -> None:
     assert shown, f"quadcosim {name}: expected a line with it in a page of docs/"
     is_called = f'"{name}"' in TESTS
     assert is_called, f'"{name}": expected a test of tests/orchestration/command that calls it'
+
+
+@pytest.mark.parametrize("name", quadrotor().objectives)
+def test_a_test_has_every_metric(name: str) -> None:
+    assert f'"{name}"' in OF_METRICS.read_text(encoding="utf-8"), (
+        f'"{name}": expected a test with a signal for which it is known, in {OF_METRICS.relative_to(ROOT)}'
+    )
 
 
 @pytest.mark.parametrize("name", FIGURES)

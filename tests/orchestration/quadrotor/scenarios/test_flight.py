@@ -24,8 +24,10 @@ from orchestration.quadrotor.scenarios.measures import desired
 from orchestration.quadrotor.scenarios.translation import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT, POSITION_REFERENCE, REFERENCE
 from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.system.connection import component_of
 from quadcosim import Result, RunInterrupted, Scenario, SimulatorError, Timing, UsageError
 from tests.native import native
+from tests.orchestration.quadrotor.scenarios.named_signals import scalars_beyond_exchanged
 
 EVERYTHING: dict[str, Any] = {
     "delay": 0.003,
@@ -160,6 +162,7 @@ import quadcosim
 from quadcosim import Scenario, Timing
 from quadcosim import Timing
 from tests.native import native
+from tests.orchestration.quadrotor.scenarios.named_signals import scalars_beyond_exchanged
 scenario = native(stop_time=1.0, seed=9, timing=Timing(**json.loads(sys.argv[1])))
 result = quadcosim.run(scenario)
 print(hashlib.sha256(result.rows.tobytes() + repr(result.events).encode()).hexdigest())
@@ -331,8 +334,13 @@ def test_what_is_recorded_can_be_chosen() -> None:
     flight = quadcosim.run(native(stop_time=0.05, record=record))
     exchanged = [f"plant.{name}" for name in (*COMMAND, *MEASUREMENT)]
     commands = [f"controller.{name}" for name in COMMAND]
-    judged = ["controller.energy", "controller.attitude_error.w"]  # the latter only because objectives name it
-    assert flight.columns == ("time", *exchanged, "plant.tilt", *commands, *judged, *POSITION_REFERENCE)
+    judged = [name for name in plain().columns if name in scalars_beyond_exchanged()]  # as the objectives name them
+    of_plant, of_controller = (
+        [chosen, *(name for name in judged if component_of(name) == component_of(chosen) and name != chosen)]
+        for chosen in ("plant.tilt", "controller.energy")
+    )
+    assert "controller.attitude_error.w" in of_controller
+    assert flight.columns == ("time", *exchanged, *of_plant, *commands, *of_controller, *POSITION_REFERENCE)
     chosen = [plain().columns.index(name) for name in flight.columns]
     assert flight.rows[:50].tolist() == plain().rows[:50, chosen].tolist()  # at its end it does not sample
     assert None not in (flight.metrics["attitude_error_rmse"], flight.metrics["energy_growth_share"])
