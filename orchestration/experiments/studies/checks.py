@@ -10,16 +10,23 @@ from orchestration.components.fmi.read_description import Model, called
 from orchestration.experiments.studies.run_columns import MOST_KINDS, Kind, RunColumns
 from orchestration.experiments.studies.store_columns import expect_columns
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.kernels import sources_of
 from orchestration.simulation.engines.batch.shape import outline
-from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words, table_of
+from orchestration.simulation.engines.resolved import (
+    check_against_fmus,
+    numeric_parameters,
+    other_periods_in_words,
+    table_of,
+)
+from orchestration.simulation.runs.columns import first_differences
 from orchestration.systems.signals.waypoints import read_waypoints
 from orchestration.systems.system.check import check_parameter, connect_references
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.input_files import distributions_in
 from orchestration.systems.system.model import System
-from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.systems.system.request import Request, errors_in_own_terms
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +52,8 @@ def check_design(columns: RunColumns) -> Checked:
             allowed = [place for place in places if not refused[place]]
             if allowed and not checks.accepts(kind, int(block.indices[allowed[0]])):
                 refused[places] = True
+            elif allowed and block.parameters:
+                checks.compare(block.indices[allowed], {name: x[allowed] for name, x in block.parameters.items()})
         if refused.any() and not first:
             index = int(block.indices[np.argmax(refused)])
             first = f"{describe_run(index, columns.study.points[index])}: {checks.error(index)}"
@@ -53,7 +62,7 @@ def check_design(columns: RunColumns) -> Checked:
         raise UsageError(first + (f" ({invalid - 1} more runs are invalid)" if invalid > 1 else ""))
     with errors_in_own_terms(columns.study.base):
         expect_tables(connect_references(checks.longest, columns.files.models_of(checks.longest)))
-    for remark in checks.systems.remarks:
+    for remark in (*checks.systems.mismatches, *checks.systems.remarks):
         warn(remark)
     return Checked(follows=tuple(filter(None, checks.systems.follows)), no_lanes=checks.systems.no_lanes)
 
@@ -63,7 +72,8 @@ class _RunChecks:
 
     def __init__(self, columns: RunColumns) -> None:
         self._columns, self._accepted = columns, dict[Kind, bool]()
-        self.systems, self.longest = _SystemChecks(columns.files), columns.study.origin
+        self.systems = _SystemChecks(columns.files, columns.study.base)
+        self.longest = columns.study.origin
 
     def accepts(self, kind: Kind, index: int) -> bool:
         """Whether the runs of a kind are valid, but for the parameters that it leaves open; one is at `index`."""
@@ -72,6 +82,14 @@ class _RunChecks:
                 self._accepted.clear()
             self._accepted[kind] = self.error(index) is None
         return self._accepted[kind]
+
+    def compare(self, indices: Integers, parameters: Mapping[str, Floats]) -> None:
+        """Look for mismatches among runs of one kind, which differ in these parameters."""
+        origin = self._columns.study.origin
+        if not self.systems.mismatches:
+            usual = numeric_parameters(origin, self._columns.files.models_of(origin))
+            for place in first_differences(parameters, usual):
+                self.error(int(indices[place]))
 
     def error(self, index: int) -> UsageError | None:
         """Why a run is invalid; None if it is valid."""
@@ -89,12 +107,14 @@ class _RunChecks:
 class _SystemChecks:
     """Checks systems against their FMUs: the first of each structure fully, later ones only for new values."""
 
-    def __init__(self, files: Files) -> None:
-        self._files = files
+    def __init__(self, files: Files, base: Request) -> None:
+        self._files, self._base = files, base
         self._known: dict[Hashable, set[tuple[str, str, Any]]] = {}
         self._periods: set[tuple[float | None, ...]] = set()
         self.remarks: dict[str, None] = {}
         """Words on what the periods of some runs mean"""
+        self.mismatches: tuple[str, ...] = ()
+        """Warnings about parameters of the first run in which two components do not fit each other"""
         self.no_lanes: str | None = None
         """Reason why some system cannot be one of many at once"""
         self.follows: dict[str, None] = {}
@@ -113,6 +133,7 @@ class _SystemChecks:
             self.no_lanes = self.no_lanes or _no_lanes(system, models)
             self._known[structure] = set(parameters)
             self._expect_believed(system)
+            self._compare(system, models)
             return
         self._expect_believed(system)
         known, of_new = self._known[structure], None
@@ -121,6 +142,12 @@ class _SystemChecks:
                 of_new = of_new or self._files.models_of(system)
                 check_parameter(system, of_new, name, key)
                 known.add((name, key, value))
+        if of_new:
+            self._compare(system, of_new)
+
+    def _compare(self, system: System, models: Mapping[str, Model]) -> None:
+        """Note parameters of components that do not fit each other."""
+        self.mismatches = self.mismatches or self._base.mismatches(numeric_parameters(system, models))
 
     def _expect_believed(self, system: System) -> None:
         """Note components whose code believes another sampling period."""

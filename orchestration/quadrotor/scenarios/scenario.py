@@ -187,6 +187,10 @@ class Scenario:
 
     def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
         """Likely mistakes: a nominal model or axes that are not the plant's, a run too short for its timing."""
+        return (*self.mismatches(parameters), *self.timing.warnings(self.stop_time))
+
+    def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
+        """A nominal model or axes of the controller that are not the plant's."""
         of_axes = axis_mismatch(parameters)
         texts = [] if of_axes is None else [of_axes]
         if not self.model_mismatch:
@@ -196,7 +200,7 @@ class Scenario:
             ]
             of_model = model_mismatch(*sides)
             texts += [] if of_model is None else [of_model]
-        return (*texts, *self.timing.warnings(self.stop_time))
+        return tuple(texts)
 
     def headline(self) -> str:
         """The controller and its timing."""

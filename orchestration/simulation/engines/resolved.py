@@ -117,7 +117,7 @@ def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSy
     words, system = describe_references(system, models), connect_references(system, models)
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
-    parameters = _parameters(system, models)
+    parameters = numeric_parameters(system, models)
     of_jobs: dict[str, float] = {}
     if job_terms(text for _, text in expressions(system)):
         from orchestration.simulation.engines.job_numbers import job_numbers  # not before: loads the scheduler
@@ -187,7 +187,8 @@ def _expect_ticks(name: str, sampling: Sampling | None, clock: InputClock) -> No
                 )
 
 
-def _parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:
+def numeric_parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:
+    """The numeric parameters of all components, by COMPONENT.NAME: those that are set, else as the FMUs start."""
     parameters = {}
     for name, model in models.items():
         values = system.components[name].parameters

@@ -104,6 +104,19 @@ def columns(request: Request, system: System, models: Mapping[str, Model], value
     return Columns(system=system, given=arrays, shape=shape, parameters=parameters, seeds=seeds, settings=settings)
 
 
+def first_differences(columns: Mapping[str, Any], parameters: Mapping[str, float]) -> list[int]:
+    """The first place at which each column differs from the parameter of this name that another component has.
+
+    Columns are by COMPONENT.NAME, of values of `parameters` in many runs.
+    """
+    of_all: dict[str, dict[str, Any]] = {}
+    for name, value in {**parameters, **columns}.items():
+        of_all.setdefault(variable_of(name), {})[name] = value
+    pairs = [(columns[name], other) for name in columns for other in of_all[variable_of(name)].values()]
+    different = [np.flatnonzero(column != other)[:1] for column, other in pairs]
+    return sorted({int(place) for places in different for place in places})
+
+
 def _common_shape(arrays: Mapping[str, Any]) -> tuple[int, ...]:
     """The shape to which arrays broadcast; raises `UsageError` naming the first that does not with those before it."""
     shape: tuple[int, ...] = ()

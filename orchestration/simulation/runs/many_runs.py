@@ -13,21 +13,28 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.shape import expect_lanes
 from orchestration.simulation.engines.master import BATCH
-from orchestration.simulation.engines.resolved import check_against_fmus, columns_of, source_signals
+from orchestration.simulation.engines.resolved import (
+    check_against_fmus,
+    columns_of,
+    numeric_parameters,
+    source_signals,
+)
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import FIXED, OUTCOME, Metrics
 from orchestration.simulation.runs.arguments import names_in
-from orchestration.simulation.runs.columns import Columns, columns
+from orchestration.simulation.runs.columns import Columns, columns, first_differences
 from orchestration.simulation.runs.flights import Flights
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.check import check, connect_references, recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.systems.system.paths import parameter_name
+from orchestration.systems.system.request import Request, errors_in_own_terms
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -69,6 +76,7 @@ def fly(
         fits = check_against_fmus(_recording(system, models, record), models)
         names = _outputs(fits.system, None if outputs is None else names_in(outputs, "outputs"))
         runs = columns(loaded, fits.system, models, values)
+        _warn_of_mismatches(loaded, runs, fits.parameters, models)
         reason = _reason_unavailable(fits.system, models, in_process)
         table = _Table(runs, names, record)
         for row in (
@@ -213,6 +221,19 @@ def _recording(system: System, models: Mapping[str, Model], record: Sequence[str
         usual[name] = (*usual[name], variable)
         components[name] = replace(components[name], record=usual[name])
     return replace(system, components=components)
+
+
+def _warn_of_mismatches(
+    request: Request, runs: Columns, parameters: Mapping[str, float], models: Mapping[str, Model]
+) -> None:
+    """Warn, as a run does, of components that do not fit each other, in the first run in which they do not."""
+    settings = [np.unique(each, return_index=True)[1] for path, each in runs.settings.items() if parameter_name(path)]
+    places = {0, *(int(place) for firsts in settings for place in firsts)}
+    for place in sorted(places.union(first_differences(runs.parameters, parameters))):
+        if texts := request.mismatches(numeric_parameters(runs.alone(place), models)):
+            for text in texts:
+                warn(text)
+            return
 
 
 def _outputs(system: System, names: Sequence[str] | None) -> tuple[str, ...]:

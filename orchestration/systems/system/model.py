@@ -165,6 +165,10 @@ class System:
         """A system has no warnings."""
         return ()
 
+    def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
+        """A system does not know which parameters of its components belong together."""
+        return ()
+
     def headline(self) -> str:
         """A system has no headline."""
         return ""

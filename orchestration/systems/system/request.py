@@ -54,6 +54,9 @@ class Request(Protocol):
     def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
         """Warnings about likely mistakes, from all numeric parameters in effect, by COMPONENT.NAME."""
 
+    def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
+        """Those of them that are about parameters of two components, which many runs may change."""
+
     def headline(self) -> str:
         """The title of a figure; empty without one."""
 

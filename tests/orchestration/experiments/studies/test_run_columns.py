@@ -122,6 +122,16 @@ def test_a_wrong_design_is_refused_for_its_first_wrong_run_in_the_words_of_that_
     assert str(caught.value) == errors[0] + more
 
 
+def test_a_study_of_another_plant_than_the_controller_believes_is_warned_of_once(
+    files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = (axis("plant.mass", 1.0, 1.1), axis("plant.frame", "ned", "enu"), axis("controller.mass", 1.0))
+    for axes, count in ((own[:1], 1), (own[1:2], 1), (own[2:], 0)):
+        check_design(RunColumns(study(*axes), files))
+        warned = capsys.readouterr().err
+        assert (warned.count("\n"), "plant.mass = 1.1" in warned) == (count, axes == own[:1])
+
+
 @needs_compiler
 def test_rows_of_runs_by_column_have_the_bits_of_runs_with_a_system_each(tmp_path: Path) -> None:
     chosen = study(

@@ -215,6 +215,20 @@ def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[
     assert "\n" not in str(error.value)
 
 
+@needs_compiler
+def test_runs_whose_controller_believes_another_plant_are_warned_of_once(capsys: pytest.CaptureFixture[str]) -> None:
+    brief, masses = NATIVE.with_changes(stop_time=0.01), {"plant.mass": [1.0, 1.1, 1.2]}
+    quadcosim.fly(brief, masses)
+    warned = capsys.readouterr().err
+    assert warned.startswith(
+        "warning: the controller's nominal model is not the plant: controller.mass = 1 where plant"
+    )
+    assert warned.count("plant.mass = 1.1") == warned.count("\n") == 1
+    quadcosim.fly(brief, {**masses, "controller.mass": masses["plant.mass"]})
+    quadcosim.fly(brief.with_changes(model_mismatch=True), masses)
+    assert capsys.readouterr().err == ""
+
+
 def test_runs_share_what_they_do_not_have_of_their_own() -> None:
     from orchestration.simulation.runs.columns import columns
 
