@@ -10,6 +10,7 @@ from orchestration.experiments.studies import sensitivity
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import Scalar, record
 from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.systems.system.distribution import is_table
 
 Value = Scalar
 Scale = Literal["linear", "logarithmic"]
@@ -17,6 +18,9 @@ Method = Literal["random", "latin-hypercube", "sobol", "morris", "saltelli"]
 """Sampling methods: the last two are for sensitivity (Morris screening, Sobol indices)"""
 MAX_POINTS = 1_000_000
 """Largest number of runs of a study"""
+CONTROLLER = frozenset({"controller", "controller.fmu", "components.controller.fmu"})
+"""Targets that set the controller of the quadrotor, by name or path"""
+OF_ONE_LAW = 'parameters of one of them stand under [controllers.NAME] of a vehicle file, vehicle = "FILE" under [base]'
 
 
 _BY_NAME = ("axis.name",)
@@ -51,6 +55,8 @@ class Axis:
             object.__setattr__(self, "targets", (self.name,))
         if self.values is not None and not self.values:
             raise UsageError(f"axis {self.name}: expected at least one value")
+        if CONTROLLER & {*self.targets} and any(is_table(v) or not isinstance(v, str) for v in self.values or ()):
+            raise UsageError(f"axis {self.name}: expected controllers by name or path; {OF_ONE_LAW}")
         if len({_kind(value) for value in self.values or ()}) > 1:
             raise UsageError(f"axis {self.name}: expected values of one kind: numbers, texts, or true and false")
         if self.values is None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.read_description import Model, called
+from orchestration.experiments.studies.axes import CONTROLLER, OF_ONE_LAW
 from orchestration.experiments.studies.run_columns import MOST_KINDS, Kind, RunColumns
 from orchestration.experiments.studies.store_columns import expect_columns
 from orchestration.foundation.basics.errors import UsageError
@@ -59,7 +60,9 @@ def check_design(columns: RunColumns) -> Checked:
             first = f"{describe_run(index, columns.study.points[index])}: {checks.error(index)}"
         invalid += int(np.count_nonzero(refused))
     if invalid:
-        raise UsageError(first + (f" ({invalid - 1} more runs are invalid)" if invalid > 1 else ""))
+        several = any(CONTROLLER & {*axis.targets} for axis in columns.study.axes)
+        hint = f"; of several controllers, {OF_ONE_LAW}" if several and ": controller." in first else ""
+        raise UsageError(first + hint + (f" ({invalid - 1} more runs are invalid)" if invalid > 1 else ""))
     with errors_in_own_terms(columns.study.base):
         expect_tables(connect_references(checks.longest, columns.files.models_of(checks.longest)))
     for remark in (*checks.systems.mismatches, *checks.systems.remarks):

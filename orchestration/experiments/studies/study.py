@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from orchestration.components.building.fmus import native_twin, native_twins
-from orchestration.experiments.studies.axes import Axis, Method, Points, Value
+from orchestration.experiments.studies.axes import CONTROLLER, Axis, Method, Points, Value
 from orchestration.experiments.studies.linked_settings import LinkedSettings
 from orchestration.experiments.studies.store_columns import is_column
 from orchestration.foundation.basics.errors import UsageError, expected_name
@@ -206,8 +206,6 @@ def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
     return [path for path in paths if path is not None]
 
 
-CONTROLLER = frozenset({"controller", "controller.fmu", "components.controller.fmu"})
-"""Targets that set the controller of the quadrotor, by name or path"""
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
 
 

@@ -1,18 +1,21 @@
 """Study files: their content, and errors for invalid ones."""
 
+import re
 from pathlib import Path
 
 import pytest
 
+from orchestration.experiments.studies.checks import check_design
+from orchestration.experiments.studies.run_columns import RunColumns
 from orchestration.experiments.studies.run_key import difference, study_parts
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
-from quadcosim import Scenario, UsageError
+from quadcosim import FmuChoice, Scenario, UsageError
 from tests.extent import sample
-from tests.orchestration.experiments.studies.common import GRID, at, one_line, starts
+from tests.orchestration.experiments.studies.common import GRID, at, axis, one_line, starts
 from tests.places import ROOT
 
 ONE = '[[axes]]\nname = "seed"\nvalues = [1]\n'
@@ -253,3 +256,24 @@ def test_the_stop_time_may_be_an_axis(tmp_path: Path) -> None:
 
 def test_noise_without_a_measurement_is_refused_as_a_target(tmp_path: Path) -> None:
     assert "timing.noise: expected" in refused(tmp_path, '[[axes]]\nname = "timing.noise"\nvalues = [0.1]\n')
+
+
+LAWS = '[[axes]]\nname = "law"\nsets = ["controller"]\nvalues = ["UnifiedController", "CascadedController"]\n'
+
+
+def test_parameters_of_one_law_stand_in_a_vehicle_file_and_elsewhere_the_error_says_so(tmp_path: Path) -> None:
+    (page,) = re.findall(r"```toml one_rate.toml\n(.*?)```", (ROOT / "docs" / "studies.md").read_text(), re.S)
+    (tmp_path / "one_rate.toml").write_text(page)
+    study = load(tmp_path, f'[base]\nvehicle = "one_rate.toml"\n{LAWS}')
+    laws = [study.system(index, {}).components["controller"].parameters for index in (0, 1)]
+    assert laws == [{}, {"velocity_ratio": 1, "attitude_ratio": 1}]
+    there = r"\[controllers.NAME\] of a vehicle file, vehicle = \"FILE\" under \[base\]"
+    other = load(tmp_path, f"[base.controller]\nvelocity_ratio = 1\n{LAWS}")
+    with pytest.raises(UsageError, match=f"controller.velocity_ratio: UnifiedController has no .*{there}"):
+        check_design(RunColumns(other, other.files()))
+    table = LAWS.replace('"CascadedController"', '{ fmu = "CascadedController", velocity_ratio = 1 }')
+    with pytest.raises(UsageError, match=f"axis law: expected controllers by name or path; .*{there}"):
+        load(tmp_path, table)
+    choice = FmuChoice(fmu="CascadedController", parameters={"velocity_ratio": 1})
+    with pytest.raises(UsageError, match=f"axis controller: expected controllers by name or path; .*{there}"):
+        Study(name="s", base=Scenario(), axes=(axis("controller", "UnifiedController", choice),))
