@@ -65,7 +65,7 @@ def inform(text: str) -> None:
 
 
 _BARS: list[Callable[[str], None]] = []
-"""Functions that set the text of the bars that are drawn, the innermost last"""
+"""Functions that set the text of the bars that are drawn, the innermost last; an empty one: its own"""
 
 
 def inform_in_passing(text: str) -> None:
@@ -75,6 +75,16 @@ def inform_in_passing(text: str) -> None:
         detail(text)
     else:
         inform(text)
+
+
+@contextmanager
+def stated_beside_bar(text: str) -> Iterator[None]:
+    """Text of the innermost bar that is drawn, while the block runs; nothing without one."""
+    for bar in _BARS[-1:]:
+        bar(text)
+    yield
+    for bar in _BARS[-1:]:
+        bar("")
 
 
 def warn(text: str) -> None:
@@ -123,7 +133,7 @@ def progress_bar(what: str) -> Iterator[Share]:
 
     with Progress(console=_console(), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
-        _BARS.append(lambda text: bar.update(task, description=text))
+        _BARS.append(lambda text: bar.update(task, description=text or what))
         try:
             yield lambda share: bar.update(task, completed=share)
         finally:

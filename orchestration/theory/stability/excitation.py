@@ -5,7 +5,7 @@ response is followed. Code that rounds more than double precision does, as in si
 gets large ones, of several sizes, of which the linear part is taken.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -142,8 +142,9 @@ class Excitation:
         return self._fmu is other._fmu and signals and np.array_equal(self.held, other.held)
 
     def measure_as(self, other: "Excitation") -> None:
-        """Take the pulses of another excitation."""
-        self.pulse, self.largest, self.scale = other.pulse, other.largest, other.scale
+        """Take the pulses of another excitation, of one or several samples of it."""
+        samples = len(self.inputs) // len(other.inputs) if other.inputs else 1
+        self.pulse, self.largest, self.scale = other.pulse, other.largest, np.tile(other.scale, samples)
         self.sizes, self.parts = other.sizes, other.parts
 
     @property
@@ -195,7 +196,7 @@ class Excitation:
                 self._time += rung.h
             self._read()
             found.append(self._outputs_now.copy())
-            if largest < np.inf and not np.abs((found[-1] - self.at_rest) / self.weight).max(initial=0.0) <= largest:
+            if largest < np.inf and not self._is_followed(found[-1], largest):
                 break
         return np.array(found).reshape(len(found), len(self.outputs))
 
@@ -230,8 +231,28 @@ class Excitation:
             later = pulsed if lasting else self.held
             legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
             courses.append(self._course(self.rest, legs, self.largest))
+        return self._response(courses, factor)
+
+    def followed_response(self, i: int, rungs: Sequence[Rung], factor: float = 1.0) -> Floats:
+        """As `response`, through states that are kept: the same ones are followed once."""
+        if len(set(rungs)) > 1:
+            return self.response(i, rungs, factor=factor)
+        courses = []
+        for move in self.moves:
+            outputs, state = self.stepped(self.rest, rungs[0], self.pulsed(i, factor * move))
+            course = [outputs]
+            while len(course) < len(rungs) and self._is_followed(course[-1], self.largest):
+                outputs, state = self.followed(state, rungs[0])
+                course.append(outputs)
+            courses.append(np.array(course))
+        return self._response(courses, factor)
+
+    def _response(self, courses: Sequence[Floats], factor: float) -> Floats:
         apart = self.apart([course[: min(map(len, courses))] for course in courses])
         return np.asarray(apart / self.weight / (2.0 * factor * self.pulse))
+
+    def _is_followed(self, outputs: Floats, largest: float) -> bool:
+        return bool(np.abs((outputs - self.at_rest) / self.weight).max(initial=0.0) <= largest)
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
@@ -310,7 +331,7 @@ class Excitation:
         """The difference of responses to two sizes, relative to the largest so far, up to each rung."""
         self.pulse, courses = pulse, []
         for i in range(len(self.inputs)):
-            once, other = self._two_sizes(i, rungs)
+            once, other = self._two_sizes(i, rungs, self.response)
             largest, apart = (np.abs(each).max(axis=1, initial=0.0) for each in (once, once - other))
             courses.append((np.maximum.accumulate(apart), np.maximum.accumulate(largest)))
         count = min(map(len, (apart for apart, _ in courses)), default=len(rungs))
@@ -319,8 +340,8 @@ class Excitation:
             found = np.maximum(found, apart[:count] / np.where(largest[:count] > 0.0, largest[:count], 1.0))
         return found
 
-    def _two_sizes(self, i: int, rungs: Sequence[Rung]) -> tuple[Floats, Floats]:
-        once, other = (self.response(i, rungs, factor=factor) for factor in (1.0, OTHER_SIZE))
+    def _two_sizes(self, i: int, rungs: Sequence[Rung], response: Callable[..., Floats]) -> tuple[Floats, Floats]:
+        once, other = (response(i, rungs, factor=factor) for factor in (1.0, OTHER_SIZE))
         count = min(len(once), len(other))
         return once[:count], other[:count]
 
@@ -329,7 +350,7 @@ class Excitation:
         twice = [*ladder, *ladder]
         values = np.zeros((len(self.inputs), len(twice), len(self.outputs)))
         for i in range(len(self.inputs)):
-            once, other = self._two_sizes(i, twice)
+            once, other = self._two_sizes(i, twice, self.followed_response)
             values[i] = np.inf  # where one is too large to be followed
             values[i, : len(once)] = np.abs(once - other)
         rounded = ROUNDING * np.abs(self.at_rest) / self.weight / self.pulse

@@ -208,7 +208,7 @@ def _bode(request: Request, component: str | None) -> Bode:
         system = deterministic(rested(request))
         name = sampled_component(system, component)
         models = files_of(system).models_of(system)
-        with whole_at_rest(system, instances, models=models) as rest:
+        with progress_bar("margins") as report, whole_at_rest(system, instances, models=models) as rest:
             loop = cut_open(rest, name)
 
             @cache
@@ -225,10 +225,9 @@ def _bode(request: Request, component: str | None) -> Bode:
                 gains = np.array([curve for curve, _ in curves])
                 each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
             found = list[LoopMargins]()
-            with progress_bar("margins") as report:
-                for margins in each if stable else ():
-                    found.append(margins)
-                    report(len(found) / len(gains))
+            for margins in each if stable else ():
+                found.append(margins)
+                report(len(found) / len(gains))
     return Bode(
         dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=tuple(found),
         outputs=tuple(_output(loop, i) for i in _commands(loop)), frequencies=frequencies, gains=gains,

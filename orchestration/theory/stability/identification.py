@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,27 +40,50 @@ FEWEST_LIFTED = 8
 """Rungs of the ladder of such a component, at least, each of all its samples"""
 
 
-def of_samples(rest: Rest, period: float, factor: float) -> Tangent | LiftedTangent:
-    """The tangent of a component that is sampled every `period` [s]; the pulses chosen are multiplied by `factor`.
+@dataclass(frozen=True, kw_only=True)
+class SampledRest:
+    """A sampled component at rest, with its pulses chosen, before its tangent is measured."""
 
-    Where its response differs from sample to sample, and repeats after some, that of these samples together. Raises
-    `UsageError` as `Tangent`, and where it does not repeat.
+    rest: Rest
+    period: float
+    """From sample to sample [s]"""
+    factor: float
+    """Factor on the pulses"""
+    excitation: Excitation
+    count: int
+    """Samples over which it is linear"""
+    samples: int
+    """Samples after which its response to a pulse repeats: more than 1 of a component of several rates"""
+
+    def tangent(self) -> Tangent | LiftedTangent:
+        """Its tangent; of several rates that of its samples together.
+
+        Its pulses are chosen one sample at a time, beginning with sample 0, at which all of its tasks run. Raises
+        `UsageError` as `Tangent`.
+        """
+        sample, samples, rest = Rung(1, self.period), self.samples, self.rest
+        if samples == 1:
+            return _tangent(self.excitation, sample, self.count)
+        rest.fmu.restore(self.excitation.rest.saved)
+        excitation = Excitation(rest)
+        rungs = max(FEWEST_LIFTED, SAMPLES // samples)
+        count = _choose_pulse(excitation, [sample] * (2 * rungs * samples), self.factor) // samples
+        rest.fmu.restore(excitation.rest.saved)
+        fmu = LiftedInstance(rest, samples, self.period)
+        lifted = Excitation(lifted_rest(rest, fmu, samples))
+        lifted.measure_as(excitation)
+        return LiftedTangent(_tangent(lifted, Rung(1, samples * self.period), count), rest, fmu, samples)
+
+
+def of_samples(rest: Rest, period: float, factor: float) -> SampledRest:
+    """A component that is sampled every `period` [s]; the pulses chosen are multiplied by `factor`.
+
+    Raises `UsageError` where its response differs from sample to sample, and does not repeat.
     """
     excitation, sample = Excitation(rest), Rung(1, period)
     count = _choose_pulse(excitation, [sample] * (2 * SAMPLES), factor)
     samples = _samples_until_alike(excitation, sample)
-    if samples > 1:
-        rest.fmu.restore(excitation.rest.saved)
-        fmu = LiftedInstance(rest, samples, period)
-        rungs = max(FEWEST_LIFTED, SAMPLES // samples)
-        whole = _of_alike_samples(Excitation(lifted_rest(rest, fmu, samples)), samples * period, factor, rungs)
-        return LiftedTangent(whole, rest, fmu, samples)
-    return _tangent(excitation, sample, count)
-
-
-def _of_alike_samples(excitation: Excitation, period: float, factor: float, rungs: int) -> Tangent:
-    sample = Rung(1, period)
-    return _tangent(excitation, sample, _choose_pulse(excitation, [sample] * (2 * rungs), factor))
+    return SampledRest(rest=rest, period=period, factor=factor, excitation=excitation, count=count, samples=samples)
 
 
 def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung], factor: float) -> int:
@@ -168,6 +192,6 @@ def _dead_samples(excitation: Excitation, ladder: Sequence[Rung]) -> int:
     """The samples before the last of the inputs is responded to, as far as there is a response."""
     dead = [0]
     for i in range(len(excitation.inputs)):
-        responds = (excitation.response(i, ladder) != 0.0).any(axis=1)
+        responds = (excitation.followed_response(i, ladder) != 0.0).any(axis=1)
         dead.append(int(np.argmax(responds)) if responds.any() else 0)
     return max(dead)

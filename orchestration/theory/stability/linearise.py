@@ -12,6 +12,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.number_text import quantity
+from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
@@ -108,7 +109,7 @@ def _linearised(request: Request, component: str | None) -> Linearised:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = rested(request)
         name = sampled_component(system, component)
-        with whole_at_rest(system, instances) as loop:
+        with progress_bar("linear models"), whole_at_rest(system, instances) as loop:
             return cut_open(loop, name)
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.foundation.basics.terminal import stated_beside_bar
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.simulation.engines.algebraic_loops import in_words
 from orchestration.simulation.engines.resolved import resolve_with_models
@@ -27,7 +28,7 @@ from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import expect_fixed_periods
 from orchestration.theory.stability.excitation import Rest
-from orchestration.theory.stability.identification import FINEST, in_continuous_time, of_samples
+from orchestration.theory.stability.identification import FINEST, SampledRest, in_continuous_time, of_samples
 from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.operating_point import (
@@ -77,6 +78,8 @@ class AtRest:
     """the hyperperiod [ns]"""
     known: KnownTangents
     """Those of other systems whose components may come to rest alike"""
+    begun: dict[str, AnyTangent | SampledRest] = field(default_factory=dict)
+    """Those of `known` that hold here, and others as far as they are measured"""
 
     @cached_property
     def tangents(self) -> dict[str, AnyTangent]:
@@ -91,17 +94,47 @@ class AtRest:
 
     def tangent(self, name: str) -> AnyTangent:
         """A component about rest."""
-        self.simulation.instances[name].restore(self.saved_states[name])
-        component = self.simulation.system.components[name]
-        if name in self.known:
-            before, period, known = self.known[name]
-            is_alike = before == component and period >= self.period >= FINEST * period
-            if is_alike and (again := known.about(self.rest_of(name))) is not None:
-                return again
-            self.simulation.instances[name].restore(self.saved_states[name])  # the attempt has moved it
-        found = _tangent(self, name, self.factor)
-        self.known[name] = component, self.period, found
+        found = self._begun(name)
+        if isinstance(found, SampledRest):
+            with stated_beside_bar(f"linear model of {name}, of {found.samples} samples"):
+                found = self._kept(name, found.tangent())
         return found
+
+    def samples(self, name: str) -> int:
+        """After how many of its samples a sampled component responds as before; its tangent is not measured yet."""
+        found = self._begun(name)
+        return samples_of(found)
+
+    def _begun(self, name: str) -> AnyTangent | SampledRest:
+        if name not in self.begun:
+            with stated_beside_bar(f"linear model of {name}"):
+                self.begun[name] = self._known(name) or self._measured(name)
+        return self.begun[name]
+
+    def _kept(self, name: str, found: AnyTangent) -> AnyTangent:
+        self.known[name] = self.simulation.system.components[name], self.period, found
+        self.begun[name] = found
+        return found
+
+    def _known(self, name: str) -> AnyTangent | None:
+        """The one of `known` if it holds here."""
+        component = self.simulation.system.components[name]
+        before, period, known = self.known.get(name, (None, Fraction(0), None))
+        is_long = component.sampling is not None or period >= self.period >= FINEST * period
+        if known is None or before != component or not is_long:
+            return None
+        self.simulation.instances[name].restore(self.saved_states[name])
+        return known.about(self.rest_of(name))
+
+    def _measured(self, name: str) -> AnyTangent | SampledRest:
+        self.simulation.instances[name].restore(self.saved_states[name])
+        model, rest = self.simulation.instances[name].model, self.rest_of(name)
+        component, period = self.simulation.system.components[name], float(self.period) / NANOSECONDS
+        if component.sampling is not None:
+            return of_samples(rest, component.sampling.period, self.factor)
+        step = component.step or period
+        unit = None if model.varies_step else step
+        return self._kept(name, in_continuous_time(rest, period, step, self.factor, unit=unit))
 
     def rest_of(self, name: str) -> Rest:
         """A component at rest: the last inputs and time, and the variables that belong to the loop."""
@@ -148,12 +181,16 @@ def whole_at_rest(
     models: Mapping[str, Model] | None = None,
     known: KnownTangents | None = None,
 ) -> Iterator[AtRest]:
-    """As `at_rest`, over a period after which components of several rates respond as before, too."""
+    """As `at_rest`, over a period after which components of several rates respond as before, too.
+
+    Their tangents are measured where they rest over that period, once.
+    """
     calm, known = deterministic(system), {} if known is None else known
-    seen = {name: tangent for name, (_, _, tangent) in known.items() if name in calm.components}
+    seen = {name: samples_of(one) for name, (_, _, one) in known.items() if name in calm.components}
     period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
     with _settled(calm, period, instances, factor, NO_SIGNALS, models, known) as loop:
-        whole = hyperperiod([period, *_cycles(calm, loop.tangents)])
+        sampled = [name for name, one in calm.components.items() if one.sampling is not None]
+        whole = hyperperiod([period, *_cycles(calm, {name: loop.samples(name) for name in sampled})])
         if whole == period:
             yield loop
             return
@@ -194,12 +231,17 @@ def begin_of(calm: System, period: Fraction) -> Fraction:
     return latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
 
 
-def _cycles(system: System, tangents: Mapping[str, AnyTangent]) -> Iterator[Fraction]:
+def samples_of(found: AnyTangent | SampledRest) -> int:
+    """After how many samples a component responds as before."""
+    return 1 if isinstance(found, Tangent) else found.samples
+
+
+def _cycles(system: System, samples: Mapping[str, int]) -> Iterator[Fraction]:
     """After how long components of several rates respond as before [ns]."""
-    for name, tangent in tangents.items():
+    for name, count in samples.items():
         sampling = system.components[name].sampling
-        if isinstance(tangent, LiftedTangent) and sampling is not None:
-            yield tangent.samples * sampling.true_period
+        if count > 1 and sampling is not None:
+            yield count * sampling.true_period
 
 
 # -- coming to rest -------------------------------------------------------------------------------------------------
@@ -245,15 +287,6 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
             raise UsageError(f"the run leaves the operating point: {why}")
         rows.append([master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)])
     expect_rest(system, np.array(rows))
-
-
-def _tangent(loop: AtRest, name: str, factor: float) -> AnyTangent:
-    model, rest = loop.simulation.instances[name].model, loop.rest_of(name)
-    component, period = loop.simulation.system.components[name], float(loop.period) / NANOSECONDS
-    if component.sampling is not None:
-        return of_samples(rest, component.sampling.period, factor)
-    step = component.step or period
-    return in_continuous_time(rest, period, step, factor, unit=None if model.varies_step else step)
 
 
 # -- instances that trace what is written to them ----------------------------------------------------------------------

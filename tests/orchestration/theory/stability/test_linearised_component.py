@@ -50,7 +50,7 @@ def rest(fmu: Any) -> Rest:
 
 
 def tangent(fmu: Any) -> Tangent:
-    return of_one_rate(of_samples(rest(fmu), 1.0, 1.0))
+    return of_one_rate(of_samples(rest(fmu), 1.0, 1.0).tangent())
 
 
 def responses(simulator: Any, samples: int) -> list[float]:
