@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.theory.stability.linearise import NEAR_ONE, Linearised
-from orchestration.theory.stability.loop_halves import closed, radius, response
+from orchestration.theory.stability.loop_halves import closed, radius
 from orchestration.theory.stability.poles import Complexes
 
 FACTORS = np.geomspace(1.0, 1e4, 401)[1:]
@@ -22,13 +22,11 @@ TURNS = np.linspace(0.0, math.pi, 361)[1:]
 HALVINGS = 50
 
 
-def lifted_gains(loop: Linearised, i: int, frequencies: Floats) -> tuple[Complexes, float]:
+def lifted_gains(loop: Linearised, i: int, frequencies: Floats, back: Complexes) -> tuple[Complexes, float]:
     """The gain of the loop of a command at each frequency, shape (n,), and the largest gain of its sensitivity.
 
-    That is by the norm of a signal over all samples.
+    That is by the norm of a signal over all samples. `back` are the `open_gains` at the frequencies.
     """
-    z = np.exp(1j * frequencies * loop.rest.dt)
-    back = -response(loop.component, z) @ response(loop.rest, z)
     own = places(loop, i)
     others = np.setdiff1d(np.arange(back.shape[1]), own)
     through = np.linalg.solve(np.eye(len(others)) + back[:, others][:, :, others], back[:, others][:, :, own])

@@ -65,7 +65,9 @@ def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
     responses = np.concatenate([abs(C @ state).max(axis=1, keepdims=True) for state in made], axis=1).max(axis=1)
     weight = np.tile(np.where(responses > 0.0, responses, 1.0), len(shown))
     reachable, observable = np.hstack(made), np.hstack(shown).T / weight[:, None]
-    left, values, right = np.linalg.svd(observable @ reachable, full_matrices=False)
+    (along, shows), (across, makes) = np.linalg.qr(observable), np.linalg.qr(reachable.T)
+    left, values, right = np.linalg.svd(shows @ makes.T)  # no larger than A, however many signals and samples
+    left, right = along @ left, right @ across.T
     rank = int((values > MINIMAL * values[0]).sum())
     root = np.sqrt(values[:rank])
     back = reachable @ right[:rank].T / root
