@@ -11,6 +11,9 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.systems.system.model import System
+from orchestration.theory.stability.identification import SampledRest
+from orchestration.theory.stability.lifted_component import LiftedTangent
+from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.period_map import growth_of_loop
 from quadcosim import Result, Scenario, Timing, UsageError
 from tests.extent import in_test_all
@@ -49,9 +52,16 @@ def test_about_hover_it_is_stable_to_89_ms_where_all_loops_run_at_one_period() -
 
 
 @in_test_all
-def test_about_hover_it_is_stable_where_outer_loops_run_at_100_and_250_hz() -> None:
-    instances = Instances()
+def test_about_hover_it_is_stable_where_outer_loops_run_at_100_and_250_hz(monkeypatch: pytest.MonkeyPatch) -> None:
+    instances, measured, measure = Instances(), list[int](), SampledRest.tangent
+
+    def counted(self: SampledRest) -> Tangent | LiftedTangent:
+        measured.append(self.samples)
+        return measure(self)
+
+    monkeypatch.setattr(SampledRest, "tangent", counted)
     assert growth_of_loop(hovering(0.001, {}), instances) < 0.0
+    assert measured == [20]
     instances.close()
 
 

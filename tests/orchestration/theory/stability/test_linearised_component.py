@@ -1,6 +1,7 @@
 """A component measured through saved states, with stubs whose states are known."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -97,6 +98,44 @@ def test_pulses_are_as_large_as_the_response_is_linear(samples: int) -> None:
     assert responses(bent, samples + 3) == pytest.approx(responses(Line(samples), samples + 3), abs=1e-9)
     assert bent.accuracy < 1e-9
     assert line.accuracy < 1e-12
+
+
+class Alternating(Line):
+    """One that takes its input at every fourth step only, by a counter, and counts its steps."""
+
+    turn, steps = 0, 0
+
+    def step(self, t: float, h: float) -> None:
+        taken = self.u if self.turn == 0 else 0.0
+        self.kept = np.concatenate([[taken], 0.9 * self.kept[:-1]])
+        self.turn, self.steps = (self.turn + 1) % 4, self.steps + 1
+
+    def save(self) -> bytes:
+        return np.array([*self.kept, self.turn]).tobytes()
+
+    def restore(self, state: bytes) -> None:
+        *kept, turn = np.frombuffer(state)
+        self.kept, self.turn = np.array(kept), int(turn)
+
+
+def test_a_component_of_several_rates_is_pulsed_at_one_sample_to_choose_and_what_has_no_effect_is_followed_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pulsed, choose = list[tuple[str, ...]](), Excitation.choose_pulse
+
+    def noted(self: Excitation, rungs: Sequence[Rung]) -> int:
+        pulsed.append(self.inputs)
+        return choose(self, rungs)
+
+    monkeypatch.setattr(Excitation, "choose_pulse", noted)
+    fmu = Alternating(3)
+    begun = of_samples(rest(fmu), 1.0, 1.0)
+    assert begun.samples == 4
+    before = fmu.steps
+    measured = begun.tangent()
+    assert set(pulsed) == {("u",)}
+    assert fmu.steps - before < 1500
+    assert responses(measured, 9) == pytest.approx(responses(Alternating(3), 9), abs=1e-8)
 
 
 class Drifting(Line):
