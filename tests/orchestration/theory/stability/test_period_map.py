@@ -21,9 +21,9 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import local_limit as local
-from orchestration.theory.stability import loop_at_rest
+from orchestration.theory.stability.identification import SampledRest
 from orchestration.theory.stability.local_limit import LOOP, TWINS, local_limits
-from orchestration.theory.stability.loop_at_rest import AnyTangent, KnownTangents
+from orchestration.theory.stability.loop_at_rest import AnyTangent, AtRest, KnownTangents
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import Growth, growth_of
 from quadcosim import Scenario, Timing, UsageError
@@ -167,18 +167,18 @@ def test_a_component_that_rests_as_for_another_value_is_identified_once(
 ) -> None:
     identified: list[str] = []
 
-    def tangent(loop: Any, name: str, factor: float) -> AnyTangent:
+    def measured(loop: AtRest, name: str) -> AnyTangent | SampledRest:
         identified.append(name)
-        return usual(loop, name, factor)
+        return usual(loop, name)
 
-    usual = loop_at_rest._tangent
-    monkeypatch.setattr(loop_at_rest, "_tangent", tangent)
+    usual = AtRest._measured
+    monkeypatch.setattr(AtRest, "_measured", measured)
     known = KnownTangents()
     values = [(0.5, 0.3), (0.5, 0.4), (0.4, 0.3), (0.6, 0.3), (0.1, 0.05)]
     for period, delay in values:
         varied = changed(system, {PERIOD: period, DELAY: delay})
         assert growth_of_loop(varied, instances, known=known) == pytest.approx(theory(period, delay), abs=1e-10)
-    assert identified == ["plant", "controller", "controller", "plant", "controller", "plant", "controller"]
+    assert identified == ["controller", "plant", "controller", "controller", "plant", "controller", "plant"]
 
 
 # -- which method is used ---------------------------------------------------------------------------------
