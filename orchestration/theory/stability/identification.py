@@ -46,7 +46,7 @@ class SampledRest:
 
     rest: Rest
     period: float
-    """From sample to sample [s]"""
+    """Interval from sample to sample [s]"""
     factor: float
     """Factor on the pulses"""
     excitation: Excitation
