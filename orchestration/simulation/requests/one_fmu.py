@@ -119,6 +119,32 @@ def late_jump(system: System) -> str | None:
     )
 
 
+def held_line(system: System) -> str | None:
+    """The warning about an input along a line, which model exchange holds in each step: the most that it changes."""
+    (component,) = system.components.values()
+    step, end = component.step, system.stop_time
+    if step is None or read_model(component.fmu, component.access).interface != "model-exchange":
+        return None
+    found = dict[str, float]()
+    grid = step * np.arange(math.ceil(end / step - 1e-9) + 1)
+    for source in system.sources.values():
+        if source.interpolation == "linear":
+            times, values = table_of(source, end)
+            rows = times[(times > 0.0) & (times < end)]
+            for column, to in zip(values.T, source.to):
+                rises = np.where(np.diff(times) > 0.0, np.diff(column), 0.0)  # a jump ends a step
+                line = functools.partial(np.interp, xp=times, fp=np.append(0.0, rises.cumsum()))
+                within = line(rows) - line(np.floor(rows / step) * step)
+                found[variable_of(to)] = float(np.abs(np.append(within, np.diff(line(grid)))).max())
+    name = max(found, key=found.__getitem__, default=None)
+    if name is None or not found[name]:
+        return None
+    return (
+        f"input {name} changes by up to {found[name]:.3g} in a step of {step:.10g} s, in which model exchange holds "
+        "it: a smaller --output-interval follows the line between rows more closely"
+    )
+
+
 def _jumps(sources: Mapping[str, Source], end: float) -> Iterator[tuple[float, str]]:
     """The times of a run up to `end` at which inputs jump [s], and their names."""
     for source in sources.values():
@@ -169,10 +195,15 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
             columns[column] = column
         elif elements:
             columns |= {each: f"{column}[{i}]" for i, each in enumerate(elements, 1)}
+        elif column in model.names("input", kinds=("String", "Binary", "Clock")):
+            kind = model.variables[column].kind
+            raise UsageError(f"{inputs}: {column} is a {kind}: a file feeds numbers only, to {listed(known)}")
         elif column != TIME:
             hint = did_you_mean(column, known)
             raise UsageError(f"{inputs}: {model.name} has no input {column}; its inputs are {listed(known)}{hint}")
-    _expect_whole_numbers_held(model, inputs, columns)
+    if not columns:
+        raise UsageError(f"{inputs}: feeds no input; expected {TIME} and columns of its inputs, {listed(known)}")
+    _expect_numbers_of_type(model, inputs, columns)
     sources = {}
     for interpolation, continuous in (("linear", True), ("previous", False)):
         fed = [each for each in columns if (model.variables[each].variability == "continuous") is continuous]
@@ -185,13 +216,17 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
     return sources
 
 
-def _expect_whole_numbers_held(model: Model, inputs: Path, columns: Mapping[str, str]) -> None:
-    """Raise `UsageError` for a number of an integer input that may not be the one in the file: rows are floats."""
-    of_64_bits = [columns[name] for name in columns if model.variables[name].type in ("Int64", "UInt64")]
-    if of_64_bits:
-        rows = read_rows(inputs, of_64_bits)
-        for column in of_64_bits:
-            beyond = np.abs(rows.columns[column]) >= 2.0**53
-            if beyond.any():
-                place = f"{inputs}: line {rows.lines[int(beyond.argmax())]}: {column}"
-                raise UsageError(f"{place}: expected a whole number that a float holds: below 2**53")
+def _expect_numbers_of_type(model: Model, inputs: Path, columns: Mapping[str, str]) -> None:
+    """Raise `UsageError` for a number that its input does not have, or that may not be the one in the file."""
+    rows = read_rows(inputs, (TIME, *columns.values()))
+    for name, column in columns.items():
+        variable, values = model.variables[name], rows.columns[column]
+        if variable.kind == "Boolean" and ((values != 0.0) & (values != 1.0)).any():
+            at = int(((values != 0.0) & (values != 1.0)).argmax())
+            raise rows.error(at, column, "0 or 1, or false or true: it is a Boolean")
+        if variable.kind in ("Integer", "Enumeration") and (values % 1.0).any():
+            raise rows.error(int((values % 1.0 != 0.0).argmax()), column, f"a whole number: it is an {variable.type}")
+        beyond = np.abs(values) >= 2.0**53
+        if variable.type in ("Int64", "UInt64") and beyond.any():
+            place = f"{inputs}: line {rows.lines[int(beyond.argmax())]}: {column}"
+            raise UsageError(f"{place}: expected a whole number that a float holds: below 2**53")

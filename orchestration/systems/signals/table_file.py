@@ -121,7 +121,7 @@ def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
         if len(row) != len(header):
             raise UsageError(f"{place}: {len(row)} values, expected {len(header)} as in the header")
         try:
-            numbers.extend(map(float, row))
+            numbers.extend(map(_number, row))
         except ValueError as error:
             raise UsageError(f"{place}: {_first_invalid(header, row)}: expected numbers only") from error
         if not all(map(math.isfinite, numbers[-len(header) :])):
@@ -160,8 +160,19 @@ def _first_invalid(header: Sequence[str], row: Sequence[str]) -> str:
     return next(f"{name} = {shown(text)}" for name, text in zip(header, row) if not _is_finite(text))
 
 
+def _number(text: str) -> float:
+    """The number of a cell; false and true, as files of outputs have them, are 0 and 1."""
+    try:
+        return float(text)
+    except ValueError:
+        truth = text.strip().lower()
+        if truth in ("false", "true"):
+            return float(truth == "true")
+        raise
+
+
 def _is_finite(text: str) -> bool:
     try:
-        return math.isfinite(float(text))
+        return math.isfinite(_number(text))
     except ValueError:
         return False

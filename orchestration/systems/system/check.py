@@ -33,7 +33,7 @@ def check(system: System, models: Mapping[str, Model]) -> None:
                 has_no = f"{place}.record: {models[name].name} has no variable {recorded}"
                 raise UsageError(f"{has_no}; {expected_name(recorded, recordable)}")
             if variable.kind not in NUMERIC:
-                raise UsageError(f"{place}.record: {recorded} is a {variable.kind}; expected one of {listed(NUMERIC)}")
+                raise UsageError(f"{place}.record: {recorded} is a {variable.kind}: only numbers can be recorded")
             if variable.causality not in ("output", "local"):
                 is_other = f"{recorded} is {_with_article(variable)}"
                 raise UsageError(f"{place}.record: {is_other}; expected an output or a local")

@@ -152,6 +152,38 @@ def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_fr
 
 
 @needs_compiler
+@pytest.mark.parametrize(
+    ("table", "refusal"),
+    [
+        ("time,on,small\n0,True,1\n1,0,2.7\n", "line 3: small = 2.7: expected a whole number: it is an Int8"),
+        ("time,on\n0,true\n1,.5\n", "line 3: on = 0.5: expected 0 or 1, or false or true: it is a Boolean"),
+        ("time\n0\n1\n", "feeds no input; expected time and columns of its inputs, u[1], u[2], on, small"),
+        ("", "feeds no input; expected time and columns of its inputs, u[1], u[2], on, small"),
+        ("time,label\n0,a\n1,b\n", "label is a String: a file feeds numbers only, to u[1], u[2], on, small"),
+        ("time,on\n0,yes\n1,no\n", "line 2: on = yes: expected numbers only"),
+    ],
+    ids=["whole", "boolean", "only time", "empty", "text", "word"],
+)
+def test_a_table_that_does_not_fit_the_inputs_is_refused(main: Main, here: Path, table: str, refusal: str) -> None:
+    more = '<Int8 name="small" valueReference="9" causality="input" start="0"/>'
+    more += '<String name="label" valueReference="10" causality="input"><Start value=""/></String>'
+    fmu, inputs = known(small(here, fmi=3, more=more)), here / "table.csv"
+    inputs.write_text(table)
+    assert f"table.csv: {refusal}" in main("run", fmu, "--inputs", inputs, code=2).stderr
+
+
+@needs_compiler
+def test_model_exchange_says_how_much_a_ramp_changes_in_the_steps_that_hold_it(main: Main, here: Path) -> None:
+    fmu, inputs = exchange(here, "integrator"), here / "ramp.csv"
+    flags = ("--in-process", "--inputs", inputs, "--stop-time", "2", "--output-interval", "0.5")
+    inputs.write_text("time,u,w\n0,0,0\n2,4,1\n")
+    warned = main("run", fmu, "--interface", "model-exchange", *flags).stderr
+    assert "ramp.csv: input u changes by up to 1 in a step of 0.5 s, in which model exchange holds it: " in warned
+    inputs.write_text("time,u,w\n0,0,0\n1,0,0\n1,4,1\n2,4,1\n")
+    assert "holds it" not in main("run", fmu, "--interface", "model-exchange", *flags).stderr
+
+
+@needs_compiler
 def test_flags_of_one_fmu_are_refused_for_a_system_and_those_of_a_loop_for_one(main: Main, here: Path) -> None:
     assert "--output-interval: for one FMU only" in main("run", "--output-interval", "0.1", code=2).stderr
     assert "--delay: for the quadrotor only" in main("run", small(here), "--delay", "0.1", code=2).stderr

@@ -84,7 +84,7 @@ def test_types_and_enumerations_by_name(tmp_path: Path) -> None:
         ran(alone(small(tmp_path), parameters={"mode": "bakward"}))
     with pytest.raises(UsageError, match=r"components.it.parameters.mode = 3: expected one of forward, backward"):
         ran(alone(small(tmp_path), parameters={"mode": 3}))
-    with pytest.raises(UsageError, match=r"^components.it.record: label is a String; expected one of Real, Integer"):
+    with pytest.raises(UsageError, match=r"^components.it.record: label is a String: only numbers can be recorded"):
         ran(alone(small(tmp_path), record=("label",)))
 
 
