@@ -158,7 +158,7 @@ class LoopTimeline:
             between = [*_orders(of, draws.largest[0])]
             ends = sorted({0, *draws.largest, *(high for ((_, high),), _ in between)})
             single: list[tuple[Box, Steps]] = [
-                (((end, end),), of((end,)))
+                (((end, end),), [(*step, 0) if isinstance(step, tuple) else step for step in of((end,))])
                 for end in ends
                 if not any(end in box and same(of((end,)), steps, (end,)) for (box,), steps in between)
             ]

@@ -140,6 +140,8 @@ def test_a_draw_of_0_may_have_an_order_of_its_own(kind: str, name: str) -> None:
     timeline = LoopTimeline(through_a_filter(), [Varying(kind=kind, name=name, path=name)])
     at_once, late = timeline.family([0.02]).letters
     assert (at_once.ranges, late.ranges) == (((0.0, 0.0),), ((0.0, 0.02),))
+    times = [factor.times for letter in (at_once, late) for factor in letter.product if factor.times is not None]
+    assert {len(each) for each in times} == {2}  # a proof needs a share of the draw in each, be it 0
     assert unstable_sequence(timeline.family([0.0])) is None
     broken = unstable_sequence(timeline.family([0.02]))
     assert broken is not None
