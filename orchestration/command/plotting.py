@@ -1,6 +1,5 @@
 """The command that draws runs: one, or several overlaid."""
 
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -79,16 +78,13 @@ def _write_film(
 
 
 def _window(results: "Sequence[Result]", start: float | None, end: float | None) -> tuple[float, float] | None:
+    from orchestration.simulation.runs.arguments import window_within
+
     if start is None and end is None:
         return None
     last = max(result.end for result in results)
     window = (0.0 if start is None else start, last if end is None else end)
-    if not 0.0 <= window[0] < window[1] < math.inf or window[0] >= last:
-        raise UsageError(
-            f"--from {shown(window[0])} --to {shown(window[1])}: expected 0 <= from < to, and from before the "
-            f"run's end at {shown(last)} s"
-        )
-    return window
+    return window_within(window, last, f"--from {shown(window[0])} --to {shown(window[1])}")
 
 
 def _beside(directories: Sequence[Path]) -> Path:

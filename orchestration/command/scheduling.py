@@ -10,7 +10,7 @@ import typer
 from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import in_columns, inform
 from orchestration.simulation.figures.names import expect_figure
@@ -65,12 +65,11 @@ def _draw(found: "Scheduled", out: Path, start: float | None, end: float | None)
 
     from orchestration.simulation.figures import gantt
     from orchestration.simulation.figures.style import SCREEN, save
+    from orchestration.simulation.runs.arguments import window_within
 
     whole = gantt.default_window(found.timeline)
     window = (start or 0.0, found.until if end is None and start is not None else end or whole[1])
-    if not 0.0 <= window[0] < window[1] or window[0] >= found.until:
-        expected = f"0 <= from < to, and from before the end at {found.until:g} s"
-        raise UsageError(f"--from {window[0]:g} --to {window[1]:g}: expected {expected}")
+    window = window_within(window, found.until, f"--from {shown(window[0])} --to {shown(window[1])}")
     style = replace(SCREEN, formats=(out.suffix[1:],))
     with style.applied():
         figure = gantt.draw(found.timeline, style, window)

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import matplotlib.figure
 import numpy as np
@@ -83,6 +84,23 @@ def test_figures_come_by_name_and_a_notebook_shows_them(result: Result, tmp_path
 def test_a_figure_that_there_is_not_is_refused_with_those_there_are(result: Result) -> None:
     with pytest.raises(UsageError, match="expected one of path, errors"):
         result.plot("eror")
+    listed: Any = ["errors"]
+    with pytest.raises(UsageError, match=r"^figure \['errors'\]: expected names, as in plot\('errors', 'path'\)$"):
+        result.plot(listed)
+
+
+@pytest.mark.parametrize("window", [(3.0, 1.0), (50.0, 60.0), "0-1", (0.0,), 3])
+def test_a_window_without_a_row_is_refused_in_a_line(window: Any, result: Result) -> None:
+    with pytest.raises(
+        UsageError, match=r"^window = .*: expected 0 <= from < to, and from before the end at [\d.]+ s$"
+    ):
+        result.plot("errors", window=window)
+
+
+@pytest.mark.parametrize("beside", [3, [3]])
+def test_only_results_lie_beside_a_result(beside: Any, result: Result) -> None:
+    with pytest.raises(UsageError, match=r"^beside = \[3\]: expected a list of results of runs$"):
+        result.plot("errors", beside=beside)
 
 
 def test_csv_has_units_in_its_head_and_the_same_numbers(result: Result, tmp_path: Path) -> None:

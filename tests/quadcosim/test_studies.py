@@ -239,6 +239,9 @@ def test_a_tuning_gives_its_searches_and_writes_their_files(tmp_path: Path) -> N
 def test_what_cannot_be_is_refused_in_a_line_before_anything_is_flown(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"timing.perio: expected .*KEY one of period"):
         Study(name="x", base=Scenario(), axes=(Axis(name="timing.perio", values=(0.1,)),))
+    folder: Any = 3
+    with pytest.raises(UsageError, match=r"^folder = 3: expected the path of a folder$"):
+        quadcosim.sweep({"name": "x", "base": Scenario(), "axes": [{"name": "seed", "values": [1]}]}, folder=folder)
 
 
 def test_without_a_package_of_an_extra_one_line_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,6 +37,13 @@ def test_the_api_names_the_argument_and_the_command_its_flag(main: Main) -> None
         quadcosim.limit(Scenario(), "peroid")
 
 
+@pytest.mark.parametrize("function", ["run", "limit", "sweep"])
+def test_an_engine_that_there_is_not_is_refused_with_those_there_are(function: str) -> None:
+    request = {"name": "one", "base": Scenario(), "axes": [{"name": "seed", "values": [1]}]}
+    with pytest.raises(UsageError, match=r"^engine = gpu: expected one of .*python, compiled"):
+        getattr(quadcosim, function)(request if function == "sweep" else Scenario(), engine="gpu")
+
+
 @pytest.mark.parametrize(("of", "name"), [("signals", "plant.positon.x"), ("metrics", "position_rms")])
 def test_a_name_that_a_result_does_not_have_is_answered_with_its_names(of: str, name: str, result: Result) -> None:
     with pytest.raises(UsageError, match=rf"there is no {name}; did you mean"):

@@ -5,6 +5,7 @@ import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from fmu_kit.scratch import temporary_folder
 from orchestration.experiments.studies import store_columns as columns
 from orchestration.experiments.studies import store_integrity as integrity
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, shown
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.workers.row import TEXT, Rows
 
@@ -27,7 +28,9 @@ def note_on_engines(engines: Mapping[str, int]) -> str | None:
 
 
 def store_path(study: str, folder: str | Path | None = None) -> Path:
-    """The path of a study's store; default: `results/NAME/study.sqlite`."""
+    """The path of a study's store; default: `results/NAME/study.sqlite`. Raises `UsageError` for what is no path."""
+    if not isinstance(folder, str | PathLike | None):
+        raise UsageError(f"folder = {shown(repr(folder))}: expected the path of a folder")
     return Path(folder or Path("results") / study) / "study.sqlite"
 
 

@@ -1,5 +1,6 @@
-"""Arguments of Python functions that are no request: values by path, names, functions; each is refused in a line."""
+"""Arguments of Python functions that are no request: values by path, names, times, functions: refused in a line."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
@@ -24,6 +25,17 @@ def names_in(names: Any, argument: str) -> tuple[str, ...]:
     if isinstance(names, str) or not all(isinstance(name, str) for name in listed):
         raise UsageError(f"{argument} = {shown(repr(names))}: expected a list of names")
     return listed
+
+
+def window_within(window: Any, end: float, given: str) -> tuple[float, float]:
+    """A span of time [s]; raises `UsageError` that begins with what was `given` unless it begins before `end`."""
+    try:
+        first, last = map(float, window)
+    except (TypeError, ValueError):
+        first = last = math.nan
+    if not 0.0 <= first < last < math.inf or first >= end:
+        raise UsageError(f"{given}: expected 0 <= from < to, and from before the end at {end:g} s")
+    return first, last
 
 
 def function_in(function: Function, argument: str, of: str) -> Function:

@@ -4,13 +4,14 @@ from collections.abc import Collection, Sequence
 
 from matplotlib.figure import Figure
 
-from orchestration.foundation.basics.errors import UsageError, did_you_mean
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, shown
 from orchestration.foundation.recording.recording import thinned
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.gallery import Figures
 from orchestration.simulation.figures.signals import columns_of, of_name
 from orchestration.simulation.figures.style import SCREEN, Style, style_named
 from orchestration.simulation.figures.views import VIEWS, View, view_of
+from orchestration.simulation.runs.arguments import window_within
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_labels import labels_of_runs
 
@@ -69,8 +70,15 @@ def _columns(name: str, view: View, runs: Sequence[Result]) -> list[str]:
 def figures_of(
     results: Sequence[Result], which: Collection[str] | None, *, window: Window | None, style: str
 ) -> Figures:
-    """The figures of runs overlaid; raises `UsageError` for an unknown figure or style."""
+    """The figures of runs overlaid; raises `UsageError` for an unknown figure or style, or a window without rows."""
     chosen = style_named(style)
+    for name in which or ():
+        if not isinstance(name, str):
+            raise UsageError(f"figure {shown(repr(name))}: expected names, as in plot('errors', 'path')")
+    if not all(isinstance(result, Result) for result in results):
+        raise UsageError(f"beside = {shown(repr([*results[1:]]))}: expected a list of results of runs")
+    if window is not None:
+        window = window_within(window, max(result.end for result in results), f"window = {shown(repr(window))}")
     return Figures(draw(results, which, window=window, style=chosen), chosen)
 
 

@@ -212,11 +212,12 @@ class Result:
         of time [s] that is shown, `style` sets sizes and fonts, as in `quadcosim plot`. The figures are those of
         matplotlib, by name.
 
-        Raises `UsageError` for an unknown figure, and for runs of different systems.
+        Raises `UsageError` for an unknown figure, a window that begins after the end, and runs of different systems.
         """
         from orchestration.simulation.runs.draw import figures_of  # not before: loads matplotlib
 
-        return figures_of([self, *beside], which or None, window=window, style=style)
+        others = beside if isinstance(beside, Sequence) else [beside]
+        return figures_of([self, *others], which or None, window=window, style=style)
 
     @explains_missing
     def to_pandas(self, what: Literal["signals", "events"] = "signals") -> "pd.DataFrame":

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.requests.request import (
@@ -19,6 +19,7 @@ from orchestration.simulation.requests.request import (
     request_from_tables,
     request_of,
 )
+from orchestration.simulation.runs.arguments import window_within
 from orchestration.systems.computers.results import Timeline
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.schedule.responses import Responses, responses_of
@@ -77,6 +78,8 @@ class Scheduled:
         from orchestration.simulation.figures.style import style_named
 
         chosen = style_named(style)
+        if window is not None:
+            window = window_within(window, self.until, f"window = {shown(repr(window))}")
         with chosen.applied():
             return Figures({"schedule": gantt.draw(self.timeline, chosen, window)}, chosen)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, overload
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
-from orchestration.simulation.engines.master import Engine
+from orchestration.simulation.engines.master import Engine, engine_named
 from orchestration.simulation.engines.pace import Pace
 from orchestration.simulation.engines.resolved import Announce, resolve
 from orchestration.simulation.runs.outcome import Course, Progress
@@ -108,6 +108,7 @@ def simulate(
 
     No instant begins before its time at a `pace`, in seconds of the run in a second.
     """
+    engine = engine_named(engine)
     if pace is not None:
         course = partial(paced, pace, course)
     if in_process and time_limit is not None:

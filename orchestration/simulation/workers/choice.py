@@ -81,6 +81,7 @@ def choose_execution(
     `first` returns the first run, checked, and its files, with native twins or not; `no_lanes`, called after it, a
     reason that rules out lanes. Raises `UsageError`, naming the obstacle, if requested lanes are impossible.
     """
+    engine = engine_choice(engine)
     if engine in ("python", "compiled"):
         return Execution(native=native, in_lanes=False, engine=engine)
     if engine == BATCH:
@@ -121,7 +122,7 @@ def _compile_lanes(system: System) -> None:
 def single_run_execution(request: Twin, engine: Engine | Literal["auto"]) -> tuple[Twin, Execution]:
     """The request to run one at a time, and how: with `auto`, the native twins of its FMUs if available."""
     if engine != "auto":
-        return request, Execution(native=False, in_lanes=False, engine=engine)
+        return request, Execution(native=False, in_lanes=False, engine=engine_named(engine, "auto"))
     native = native_twins(request)
     try:
         files_of(system_of(native))
