@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import typer.main
 
-from orchestration.command.cli import app
+from orchestration.command import cli
 from orchestration.components.building.models import MODELS
 from orchestration.quadrotor.scenarios.translation import quadrotor
 from orchestration.simulation.engines.batch.folds import LANES
@@ -26,7 +26,7 @@ DRAWN = "".join(
     for name in ("figures", "schedule")
     for path in (ROOT / "tests").rglob(f"test_{name}.py")
 )
-COMMANDS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+COMMANDS = sorted(typer.main.get_command_name(place.split(".")[1]) for of in cli.COMMANDS.values() for place in of)
 FIGURES = sorted({name for view in VIEWS.values() for name in view.names})
 
 
@@ -111,6 +111,16 @@ def test_a_page_and_a_test_have_every_command(name: str) -> None:
     assert shown, f"quadcosim {name}: expected a line with it in a page of docs/"
     is_called = f'"{name}"' in TESTS
     assert is_called, f'"{name}": expected a test of tests/orchestration/command that calls it'
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_command_has_a_flag_twice(name: str) -> None:
+    try:
+        cli.command_line(name)
+    except ValueError as error:
+        pytest.fail(
+            f"quadcosim {name}: {error}: expected a name that no other flag of it has, in orchestration/command"
+        )
 
 
 @pytest.mark.parametrize("name", quadrotor().objectives)

@@ -53,7 +53,10 @@ def test_every_field_has_a_sentence_of_its_own(name: str) -> None:
     documented_fields = {name: text for base in declared for name, text in documented(base).items()}
     for field in dataclasses.fields(cls):
         text = documented_fields.get(field.name, "")
-        assert text.endswith(".") and text[0].isupper(), f"{name}.{field.name}: {text!r}"  # noqa: PT018
+        home = inspect.getsourcefile(next(base for base in reversed(declared) if field.name in base.__annotations__))
+        assert text.endswith(".") and text[0].isupper(), (  # noqa: PT018
+            f"{name}.{field.name}: {text!r}: expected a sentence in three quotes below it in {home}"
+        )
 
 
 def documented(cls: type) -> dict[str, str]:
