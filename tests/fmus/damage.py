@@ -16,7 +16,8 @@ Files = dict[str, bytes]
 Damage = Callable[[Files], None]
 """Changes the files of an FMU in place"""
 
-_OF_THE_TYPE = ("start", "unit", "min", "max")
+_OF_THE_TYPE = ("start", "unit", "displayUnit", "min", "max", "nominal", "quantity", "declaredType", "reinit")
+"""Attributes that FMI 2.0 has at the type of a variable: another one is put at the variable itself"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -115,7 +115,14 @@ def make(native: dict[str, Path], tmp_path: Path) -> Make:
 def test_the_rule_that_is_meant_for_it_finds_the_mutant(version: int, mutant: Mutant, findings: Findings) -> None:
     found = findings(version, mutant)
     texts = [finding.text for finding in found if finding.rule == mutant.rule_of(version)]
-    assert any(all(word in text for word in mutant.words_of(version)) for text in texts), "\n".join(map(str, found))
+    words = " and ".join(map(repr, mutant.words_of(version)))
+    assert any(all(word in text for word in mutant.words_of(version)) for text in texts), "\n".join(
+        [
+            f"{mutant.name}, of tests/fmus/mutants.py, in FMI {version}: expected the rule "
+            f"{mutant.rule_of(version)} to find it, with {words} in its text; found:",
+            *(map(str, found) if found else ["nothing"]),
+        ]
+    )
     assert not any("\n" in finding.text for finding in found)
 
 
