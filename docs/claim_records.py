@@ -84,7 +84,7 @@ class Claim:
     """A claim in one sentence, with what was tried against it."""
 
     claim: str
-    """The sentence, with numbers by name."""
+    """The sentence: numbers that were found by name, those of its conditions in digits. No test tells them apart."""
     numbers: Mapping[str, str]
     """Numbers by name: a file of docs/data and a pointer into it (RFC 6901)."""
     command: str

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 import typer.main
 
+from fmu_kit.bundle import Target
 from orchestration.command import cli
 from orchestration.components.building.models import MODELS
 from orchestration.quadrotor.scenarios.translation import quadrotor
@@ -75,6 +76,16 @@ def test_every_variable_says_what_it_is(model: str) -> None:
             f"{model}.{variable.name}: expected a description, as the first argument of its declaration in "
             f"{module.partition('.')[0]}/"
         )
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_page_and_an_icon_lie_beside_every_slave(model: str) -> None:
+    target = Target.parse(MODELS[model])
+    missing = [str(path.relative_to(ROOT)) for path in (target.fragment, target.icon) if not path.is_file()]
+    assert missing == [], (
+        f"{missing}: expected a page with equations and departures (.html), and an icon (.png) that docs/make_icons.py "
+        f"draws"
+    )
 
 
 def test_every_reduction_has_its_form_in_lanes() -> None:
