@@ -161,14 +161,16 @@ def test_a_scenario_written_and_loaded_is_the_same(
     "field", [each for each in fields(Scenario) if isinstance(each.default, int | float)], ids=lambda each: each.name
 )
 def test_a_number_of_a_scenario_is_read_written_shown_and_has_a_flag(field: Field[Any], file: Path) -> None:
-    key, value = field.name, not field.default if isinstance(field.default, bool) else type(field.default)(7)
-    scenario, home = Scenario(**{key: value}), "orchestration/quadrotor/scenarios"
+    key, default = field.name, field.default
+    value = not default if isinstance(default, bool) else 7 if isinstance(default, int) else 7.0
+    given: dict[str, Any] = {key: value}
+    scenario, home = Scenario(**given), "orchestration/quadrotor/scenarios"
     read = getattr(loaded(file, f"{key} = {str(value).lower()}"), key)
     assert read == value, f"{key} of a file: expected it in `scenario_from_tables` of {home}/file.py"
     assert loaded(file, scenario.to_toml()) == scenario, f"{key}: expected it in `text_of` of {home}/scenario_text.py"
     flags = {each.name for each in fields(FlightFlags)}
     assert key in flags, f"{key}: expected a flag, a field of `FlightFlags` in orchestration/command/flags.py"
-    flagged = FlightFlags(**{key: value}).applied_to(Scenario())
+    flagged = FlightFlags(**given).applied_to(Scenario())
     assert flagged == scenario, f"{key}: expected `applied_to` in orchestration/command/flags.py to set it"
     page = (ROOT / "docs/start.md").read_text(encoding="utf-8")
     assert f"`{key}`" in page, f"{key}: expected it in docs/start.md, among what may be at the top of a scenario"
