@@ -7,12 +7,16 @@ where all samples of a period are alike, a turn of the phase.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.number_text import quantity
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.model import System
 from orchestration.theory.stability.lifted_margins import places
 from orchestration.theory.stability.linearise import Linearised
 from orchestration.theory.stability.loop_halves import loop_gains, radius, with_rest
@@ -23,9 +27,22 @@ FARTHEST = 5.0
 """Longest delay of a command that is tried, in first estimates"""
 PARTS = 4
 """Delays that are tried in a sample, where samples of a period differ"""
+SIDES = (0.0, 1.0 / NANOSECONDS)
+"""Delays beyond a jump [s]: none, and the next one"""
+MOST_JUMPS = 40
+"""Jumps in a sample, to both sides of which the loop is tried, at most"""
 
-Late = Callable[[float], StateSpace]
-"""The rest of a loop to which commands come later by less than a sample [s]"""
+
+@dataclass(frozen=True, kw_only=True)
+class Late:
+    """The rest of a loop to which commands come later by less than a sample."""
+
+    rest: Callable[[float], StateSpace]
+    """The rest by that delay [s]"""
+    jumps: Sequence[float] = ()
+    """Delays at which a command comes just at a sample of its receiver, and misses it with more [s]"""
+
+
 Crossover = tuple[float, float]
 """A frequency at which the loop gain is 1 [rad/s], and the delay by which its phase is that of -1 [s]"""
 
@@ -47,6 +64,21 @@ def crossover_at(frequency: float, gain: complex) -> Crossover:
     return frequency, _turn(gain) / frequency
 
 
+def jumps_of(system: System, name: str) -> tuple[float, ...]:
+    """The `jumps` of all that a sampled component sends, less than a sample, in rising order."""
+    own, found = system.components[name].sampling, set[Fraction]()
+    for x in system.connections:
+        other = system.components[x.receiver].sampling if x.sender == name else None
+        if own is None or other is None:
+            continue
+        ratio = other.true_period / own.true_period
+        apart = own.true_period / ratio.denominator
+        first = (other.true_offset - own.true_offset - exact_nanoseconds(lowest(x.delay))) % apart
+        if ratio.denominator <= MOST_JUMPS:
+            found.update(first + k * apart for k in range(ratio.denominator))
+    return tuple(float(jump) / NANOSECONDS for jump in sorted(found))
+
+
 def _of_one_rate(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> float:
     """Between the whole samples where the first crossover comes to -1: there its phase is followed over the delay."""
     dt = loop.dt
@@ -55,7 +87,7 @@ def _of_one_rate(loop: Linearised, i: int, crossovers: Sequence[Crossover], late
     near = [one for one in crossovers if one[1] < least + 2.0 * dt]
 
     def beyond(delay: float) -> float:
-        rest = late(_rounded(delay - whole * dt))
+        rest = late.rest(_rounded(delay - whole * dt))
         return max(_beyond(loop, i, rest, one, delay, whole) for one in near)
 
     low, high = whole * dt, (whole + 1) * dt
@@ -81,20 +113,24 @@ def _beyond(loop: Linearised, i: int, rest: StateSpace, crossover: Crossover, de
 
 
 def _of_several(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> float:
-    """The first of a few delays in each sample at which the spectral radius is above 1, and the zero before it."""
+    """The first of a few delays in each sample at which the spectral radius is above 1, and the zero before it.
+
+    They are those to both sides of each jump, too.
+    """
     dt, known = loop.dt, dict[float, Linearised]()
 
     def beyond(delay: float) -> float:
         whole = math.floor(delay / dt + 0.5 / (NANOSECONDS * dt))
         part = max(0.0, _rounded(delay - whole * dt))
         if part not in known:
-            known[part] = _with(loop, i, late(part)) if part else loop
+            known[part] = _with(loop, i, late.rest(part)) if part else loop
         return radius(_with_samples(known[part], i, whole)) - 1.0
 
     before = (0.0, loop.radius - 1.0)
     farthest = FARTHEST * min(delay for _, delay in crossovers) + dt
-    for step in range(1, math.ceil(PARTS * farthest / dt) + 1):
-        delay = _rounded(step * dt / PARTS)
+    steps = range(1, math.ceil(PARTS * farthest / dt) + 1)
+    sides = (k * dt + jump + side for k in range(math.ceil(farthest / dt)) for jump in late.jumps for side in SIDES)
+    for delay in sorted({_rounded(one) for one in (*(step * dt / PARTS for step in steps), *sides)} - {0.0}):
         now = delay, beyond(delay)
         if now[1] > 0.0:
             return zero_between(beyond, _rounded, before, now)[0]

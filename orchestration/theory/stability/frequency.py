@@ -22,7 +22,7 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.theory.stability.delay_margin import Crossover, Late, crossover_at, delay_margin
+from orchestration.theory.stability.delay_margin import Crossover, Late, crossover_at, delay_margin, jumps_of
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.linearise import (
@@ -212,9 +212,10 @@ def _bode(request: Request, component: str | None) -> Bode:
             loop = cut_open(rest, name)
 
             @cache
-            def late(delay: float) -> StateSpace:
+            def later(delay: float) -> StateSpace:
                 return rest_of_loop(rest, name, delayed(rest.simulation.system, name, delay).connections)
 
+            late = Late(rest=later, jumps=jumps_of(rest.simulation.system, name))
             expect_decided(loop)
             frequencies, stable = _frequencies(loop), loop.radius < 1.0
             if loop.samples == 1:

@@ -5,15 +5,17 @@ import json
 import math
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
+from orchestration.theory.stability import delay_margin as delay_margin_module
 from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
+from orchestration.theory.stability.delay_margin import Late, jumps_of
 from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
 from orchestration.theory.stability.loop_halves import closed, loop_gains
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
@@ -128,6 +130,28 @@ def test_a_delay_to_a_sampled_receiver_acts_where_a_message_misses_its_sample(pe
     assert [one.value for one in found.crossings] == [pytest.approx(longest + 0.002, abs=1e-12)]
     (crossing,) = found.crossings
     assert math.hypot(crossing.real, crossing.imaginary) == pytest.approx(after, rel=1e-9)  # that which has jumped out
+
+
+def test_a_loop_that_is_unstable_for_a_while_between_two_jumps_has_the_margin_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A stub of a loop, which is unstable with delays of 11 to 12 ms, between the quarters of its samples."""
+    one = system_of("dc_servo")
+    servo = dataclasses.replace(one.components["servo"], step=None, sampling=Sampling(period=0.01, offset=0.003))
+    other = dataclasses.replace(one.components["controller"], sampling=Sampling(period=0.02))
+    jumps = jumps_of(dataclasses.replace(one, components={"controller": other, "servo": servo}), "controller")
+    assert jumps == (0.001, 0.011)
+    monkeypatch.setattr(delay_margin_module, "_with", lambda loop, i, rest: rest)
+    monkeypatch.setattr(
+        delay_margin_module,
+        "_with_samples",
+        lambda part, i, whole: whole * 0.02 + (part if isinstance(part, float) else 0),
+    )
+    monkeypatch.setattr(delay_margin_module, "radius", lambda delay: 1.1 if 0.011 < delay < 0.012 else 0.9)
+    loop = dataclasses.replace(linearise(one), samples=2, radius=0.9)
+    loop = dataclasses.replace(loop, rest=dataclasses.replace(loop.rest, dt=0.04))
+    late = Late(rest=lambda part: cast(Any, part), jumps=jumps)
+    assert delay_margin_module.delay_margin(loop, 0, [(1.0, 0.02)], late) == 0.011
 
 
 def test_components_in_continuous_time_that_exchange_at_their_steps_are_named() -> None:
