@@ -22,10 +22,13 @@ TURNS = np.linspace(0.0, math.pi, 361)[1:]
 HALVINGS = 50
 
 
-def lifted_gains(loop: Linearised, i: int, frequencies: Floats, back: Complexes) -> tuple[Complexes, float]:
+def lifted_gains(
+    loop: Linearised, i: int, frequencies: Floats, back: Complexes, added: Complexes
+) -> tuple[Complexes, float]:
     """The gain of the loop of a command at each frequency, shape (n,), and the largest gain of its sensitivity.
 
-    That is by the norm of a signal over all samples. `back` are the `open_gains` at the frequencies.
+    That is by the norm of a signal over all samples. `back` are the `open_gains` at the frequencies, `added` the
+    `sensitivities`, in which poles of 1, as of a position, do not cancel.
     """
     own = places(loop, i)
     others = np.setdiff1d(np.arange(back.shape[1]), own)
@@ -34,7 +37,7 @@ def lifted_gains(loop: Linearised, i: int, frequencies: Floats, back: Complexes)
     values, vectors = np.linalg.eig(of_command)
     harmonic = np.exp(-1j * np.outer(frequencies * loop.dt, np.arange(loop.samples)))
     chosen = np.abs(np.einsum("nj,njk->nk", harmonic, vectors)).argmax(axis=1)
-    peak = np.linalg.norm(np.linalg.inv(np.eye(len(own)) + of_command), 2, axis=(1, 2)).max()
+    peak = np.linalg.norm(added[:, own][:, :, own], 2, axis=(1, 2)).max()
     return np.take_along_axis(values, chosen[:, None], axis=1)[:, 0], float(peak)
 
 

@@ -65,6 +65,13 @@ def open_gains(loop: Linearised, frequencies: Floats) -> Complexes:
     return np.asarray(-(law.C @ of_law + law.D @ rest.C @ of_rest + law.D @ rest.D))
 
 
+def sensitivities(loop: Linearised, frequencies: Floats) -> Complexes:
+    """All commands by what is added to each, with the loop closed, shape (n, commands, commands)."""
+    z, whole = np.exp(1j * frequencies * loop.rest.dt), closed(loop)
+    states = np.linalg.solve(z[:, None, None] * np.eye(len(whole.A)) - whole.A, whole.steps.astype(complex)[None])
+    return np.asarray(np.eye(len(whole.direct)) + whole.direct + whole.commands @ states)
+
+
 def loop_gains(
     loop: Linearised, frequencies: Floats, only: int | None = None, late: StateSpace | None = None
 ) -> Complexes:

@@ -17,7 +17,7 @@ from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
 from orchestration.theory.stability.delay_margin import Late, jumps_of
 from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
-from orchestration.theory.stability.loop_halves import closed, loop_gains
+from orchestration.theory.stability.loop_halves import closed, loop_gains, open_gains, sensitivities
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import example
@@ -221,6 +221,8 @@ def test_a_loop_that_rounding_decides_is_refused_and_so_are_halves_that_are_not_
     with pytest.raises(UsageError, match="cannot be cut open there"):
         expect_decided(dataclasses.replace(loop, component=law))
     assert np.abs(np.linalg.eigvals(closed(loop).A)).max() == pytest.approx(loop.radius, rel=1e-9)
+    at = np.array([1.0, 50.0, 300.0])
+    assert sensitivities(loop, at) == pytest.approx(np.linalg.inv(1.0 + open_gains(loop, at)), rel=1e-6)
 
 
 def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
