@@ -48,7 +48,8 @@ NAME = "quadcosim/Quadrotor-v0"
 
 def nearness(now: Any) -> Any:
     """The default reward of `quadcosim/Quadrotor-v0`: 1 / (1 + d²), d [m] from the reference; also of arrays."""
-    return 1.0 / (1.0 + sum((now[f"plant.position.{axis}"] - now[f"reference.position.{axis}"]) ** 2 for axis in "xyz"))
+    away = [now[f"plant.position.{axis}"] - now[f"reference.position.{axis}"] for axis in "xyz"]
+    return 1.0 / (1.0 + sum(x * x for x in away))  # ** 2 of a number and of an array may differ in the last bit
 
 
 def quadrotor(**settings: Any) -> "Environment":

@@ -11,12 +11,14 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def values_by_path(values: Any, what: str) -> dict[str, Any]:
     """Values by path; raises `UsageError` that begins with `what` they are (`values =`) for anything else."""
+    if hasattr(values, "keys"):  # a table of pandas too
+        values = dict(values)
     if not isinstance(values, Mapping):
         raise UsageError(f"{what} {shown(repr(values))}: expected a dictionary of values by path, as {{'seed': 1}}")
     for path in values:
         if not isinstance(path, str):
             raise UsageError(f"{what} {shown(repr(values))}: expected paths as text, not {shown(repr(path))}")
-    return dict(values)
+    return {**values}
 
 
 def names_in(names: Any, argument: str) -> tuple[str, ...]:

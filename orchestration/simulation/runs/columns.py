@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.read_description import Model
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError, prefixed, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.runs.arguments import values_by_path
 from orchestration.systems.system.check import check_parameter
@@ -57,7 +57,8 @@ class Columns:
         for run in range(self.count):
             point = tuple(column[run] for column in self.settings.values())
             if point not in by_settings:
-                by_settings[point] = changed(self.system, dict(zip(self.settings, point))) if point else self.system
+                with prefixed(f"run {self.name(run)}: "):
+                    by_settings[point] = changed(self.system, dict(zip(self.settings, point))) if point else self.system
             systems.append(by_settings[point])
         return systems
 
@@ -147,6 +148,8 @@ def _array(target: str, value: Any) -> Any:
     """A value as an array of numbers, truth values or texts; raises `UsageError` if it is none."""
     try:
         array = np.asarray(value)
+        if array.dtype == object:  # words in a column of pandas
+            array = np.asarray(array.tolist())
     except ValueError:  # rows of different lengths
         array = np.zeros(0)
     if array.dtype.kind not in "fiubU" or not array.size:

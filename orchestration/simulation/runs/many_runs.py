@@ -12,6 +12,7 @@ import numpy as np
 from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
+from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
@@ -47,6 +48,7 @@ def fly(
     record: Sequence[str] = (),
     metrics: Mapping[str, str] = MappingProxyType({}),
     in_process: bool = False,
+    progress: CountProgress = "bar",
 ) -> Flights:
     """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
 
@@ -60,7 +62,8 @@ def fly(
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
     else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
-    have a process each; `in_process`: all may run in lanes, and in this process, which they can end.
+    have a process each; `in_process`: all may run in lanes, and in this process, which they can end. `progress` is
+    called with the number of runs done and the total; None for silence.
 
     Raises `UsageError` for a path, an output or a column that does not exist, arrays that do not broadcast, and invalid
     values; and what `run` raises for a run that fails, naming it.
@@ -79,12 +82,15 @@ def fly(
         _warn_of_mismatches(loaded, runs, fits.parameters, models)
         reason = _reason_unavailable(fits.system, models, in_process)
         table = _Table(runs, names, record)
-        for row in (
+        rows = (
             _one_by_one(runs, range(runs.count), record, in_process)
             if reason
             else _in_lanes(runs, fits.parameters, record)
-        ):
-            table.put(row)
+        )
+        with runs_reporter(progress) as report:
+            for done, row in enumerate(rows, 1):
+                table.put(row)
+                report(done, runs.count)
     engine = table.engine if reason else BATCH
     _NOTES.debug("%d runs by the engine %s%s", runs.count, engine, f": {reason}" if reason else "")
     known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units}

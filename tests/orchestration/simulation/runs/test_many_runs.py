@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import quadcosim
@@ -53,8 +54,13 @@ def test_each_run_of_arrays_is_the_run_alone() -> None:
 
 
 @needs_compiler
-def test_a_local_that_no_run_records_unasked_can_be_recorded() -> None:
-    found = quadcosim.fly(SHORT, {X: [0.0]}, outputs=["good"], record=["controller.sample_count"])
+def test_a_local_that_no_run_records_unasked_can_be_recorded_of_the_runs_of_a_table() -> None:
+    done: list[tuple[int, int]] = []
+    table: Any = pd.DataFrame({X: [0.0, 1.0], "controller.discretisation": ["mean", "explicit"]})
+    found = quadcosim.fly(
+        SHORT, table, outputs=["good"], record=["controller.sample_count"], progress=lambda *of: done.append(of)
+    )
+    assert done == [(1, 2), (2, 2)]
     assert found["controller.sample_count"][0, [0, -1]].tolist() == [1.0, 50.0]
 
 
@@ -191,7 +197,7 @@ WRONG: list[tuple[Any, dict[str, Any], str]] = [
     ({X: [0.0]}, {"metrics": {"tilt": "max(plant.tlt)"}}, r"plant.tlt"),
     ({X: [0.0]}, {"metrics": {"tilt": "plant.tilt"}}, r"tilt: plant.tilt has a value at each instant; .* as max\(…\)"),
     ({"plant.mass": [1.0, -1.0]}, {}, r"^plant.mass = -1.0: expected at least 0"),
-    ({"timing.period": [0.1, -1.0]}, {}, r"^timing.period = -1.0: expected a positive number$"),
+    ({"timing.period": [0.1, -1.0]}, {}, r"^run 1: timing.period = -1.0: expected a positive number$"),
     ({"controller.discretisation": ["mean", "meen"]}, {}, r"controller.discretisation = meen: did you mean mean"),
     ({"controller.fmu": ["A", "B"]}, {}, r"controller.fmu: expected runs of the same FMUs"),
     ({X: [0.0], f"components.{X.replace('t.', 't.parameters.', 1)}": [1.0]}, {}, r"are given twice"),
