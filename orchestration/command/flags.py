@@ -233,9 +233,13 @@ def flight_options(command: Command) -> Command:
 def request_from(path: Path | None, flags: FlightFlags, timing: Path | None = None) -> "Request":
     """The system or scenario of a file, an SSP with its timing, or the paper's scenario, with the flags applied."""
     from orchestration.quadrotor.scenarios.scenario import Scenario
-    from orchestration.simulation.requests.request import load_request
+    from orchestration.simulation.requests.request import FMU, load_request
     from orchestration.systems.system.request import system_of
 
+    if path is not None and timing is None and path.suffix.lower() == FMU:
+        from orchestration.command.one_fmu import OneFmuFlags  # which has these flags
+
+        return OneFmuFlags().applied_to(path, flags)
     request = Scenario() if path is None else load_request(path, timing)
     if isinstance(request, Scenario):
         return flags.applied_to(request)

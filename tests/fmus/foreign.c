@@ -90,7 +90,7 @@ int fmi2DoStep(void *c, double t, double h, int no_set) {
 #endif
     m->s.x += (m->s.u - m->s.x) * h / (m->s.tau + h);
 #ifdef CREEPS
-    m->s.tau += h;
+    if (t > 50 * h) m->s.tau += h;
 #endif
 #ifdef LEAKS
     static double *volatile lost;

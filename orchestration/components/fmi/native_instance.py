@@ -31,6 +31,7 @@ from orchestration.foundation.basics.errors import (
     SimulatorError,
     StoppedStepError,
     UsageError,
+    listed,
 )
 from orchestration.foundation.basics.simulator import Floats, Transfer
 
@@ -360,13 +361,25 @@ class NativeInstance(Instance):
         counts = (ctypes.c_size_t(len(values)),) if self.counts_values else ()
         arguments = (self._component, of, ctypes.c_size_t(len(references)), at, *counts)
         call = self.guarded(self._library[function])  # without argument types, by which ctypes would convert
-        failure = self.failure
+        failure, otherwise = self.failure, self._refused_values
 
         def transfer() -> None:
             if (status := call(*arguments)) > slaves.WARNING:
-                raise failure(function, status)
+                raise failure(function, status, otherwise(function, status, references))
 
         return transfer
+
+    def _refused_values(self, function: str, status: int, references: Sequence[int]) -> str:
+        """Why a call without a message failed, with the variables that it transfers."""
+        names = [
+            v.name
+            for v in self.variables.values()
+            if v.reference in references and function in (self._access("Get", v.type), self._access("Set", v.type))
+        ]
+        return (
+            self.problem()
+            or f"returned {slaves.status_name(self.model.version, status)}, without a message, for {listed(names)}"
+        )
 
     def guarded(self, call: Callable[..., int]) -> Callable[..., int]:
         """A function of the FMU that restores the rounding mode after each call."""

@@ -152,7 +152,7 @@ def _expect_plain(value: Any, place: str) -> None:
         if isinstance(value, str) and "\0" in value:
             raise UsageError(f"{place} = {shown(repr(value))}: expected text without NUL characters")
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise UsageError(f"{place}: expected a whole number of at most 64 bits")
+            raise UsageError(f"{place}: expected a whole number from -2^63 to 2^63 - 1")
         if isinstance(value, Mapping):
             items = [(str(key), item) for key, item in value.items()]
         elif isinstance(value, Sequence) and not isinstance(value, str):

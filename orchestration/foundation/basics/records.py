@@ -223,7 +223,7 @@ def _first_problem(error: "pydantic.ValidationError", place: str, kwargs: Mappin
     at = place + ".".join(map(str, parts))
     alike = {each["type"] for each in problems if _place(each["loc"], kwargs)[0] == parts}
     if alike & {"less_than", "greater_than_equal"}:
-        return f"{at}: expected a whole number of at most 64 bits"
+        return f"{at}: expected a whole number from -2^63 to 2^63 - 1"
     if first["type"] == "literal_error":
         words = re.findall(r"'([^']*)'", first["ctx"]["expected"])
         return f"{at} = {shown(value)}: expected one of {', '.join(words)}"

@@ -36,9 +36,10 @@ class AssignedLoop:
 
     @property
     def converted(self) -> tuple[str, ...]:
-        """Outputs that are no Reals, or are not connected to Reals."""
-        mixed = [start for start, end in self.connections if {self.kinds[start], self.kinds[end]} != {"Real"}]
-        return tuple(dict.fromkeys(".".join(start) for start in mixed))
+        """Connections that are not from a Real to a Real."""
+        other = [(start, end) for start, end in self.connections if {self.kinds[start], self.kinds[end]} != {"Real"}]
+        kinds = self.kinds
+        return tuple(dict.fromkeys(f"{'.'.join(start)} ({kinds[start]} to {kinds[end]})" for start, end in other))
 
     @property
     def signals(self) -> tuple[str, ...]:

@@ -79,7 +79,7 @@ def _capable(tools: Sequence[Tool], converted: Sequence[str], announce: Callable
     """The tools that can run a system; the others are announced. Raises `UsageError` if there are none."""
     capable = [tool for tool in tools if tool.converts or not converted]
     left_out = "; ".join(tool.name for tool in tools if tool not in capable)
-    text = f"{left_out}: no conversion of types, as of {', '.join(converted)}"
+    text = f"{left_out}: connects a Real to a Real only, not {', '.join(converted)}"
     if not capable:
         raise UsageError(f"--tool {text}; expected one that has it")
     if left_out and announce is not None:

@@ -36,7 +36,7 @@ def table(result: Result, model: Model, names: Sequence[str]) -> npt.NDArray[Any
     layout = [("time", np.float64, ())]
     layout += [(name, _TYPES[types[name]], tuple(declared[name].shape or ())) for name in ordered]
     filled = np.zeros(len(result.rows), dtype=layout)
-    filled["time"] = result.signals["time"] + (stated.start_time or 0.0)
+    filled["time"] = np.round(result.signals["time"] + (stated.start_time or 0.0), 9)  # [s], to nanoseconds
     for name in ordered:
         elements = [v.name for v in model.variables.values() if v.whole == name]
         values = np.column_stack([result.signals[f"{component}.{element}"] for element in elements])

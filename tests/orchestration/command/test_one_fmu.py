@@ -7,6 +7,7 @@ import fmpy
 import pytest
 from fmpy.util import read_csv, write_csv
 
+from orchestration.command.flags import FlightFlags, request_from
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.requests.one_fmu import remarks
 from orchestration.simulation.requests.request import load_request
@@ -79,6 +80,15 @@ def test_a_default_end_that_is_long_is_said_with_its_steps(here: Path) -> None:
     assert remark.startswith("runs for 1e+08 s, as ")
     assert "declares, in 500 steps of 200000 s; --stop-time T ends sooner" in remark
     assert not [*remarks(system, is_default_end=False)]
+
+
+@needs_compiler
+def test_all_commands_set_what_run_sets_and_a_value_that_cannot_be_read_is_named(main: Main, here: Path) -> None:
+    fmu = known(small(here, fmi=3, more='<Int8 name="lost" valueReference="99" causality="output"/>'))
+    (component,) = request_from(fmu, FlightFlags(set=["gain=2"])).as_system().components.values()
+    assert component.parameters == {"gain": 2.0}
+    refused = main("run", fmu, "--in-process", code=1).stderr
+    assert "fmi3GetInt8: returned fmi3Error, without a message, for lost" in refused
 
 
 def numbers(rows: list[str]) -> list[float]:

@@ -17,7 +17,6 @@ from orchestration.components.fmi.read_description import Variable, declared_of
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 
-_FEW = ExcitationPlan(steps=20)
 _DIGITS = 5e-15
 """relative error of a number in a text of 15 digits"""
 
@@ -65,7 +64,7 @@ def start_values(probe: Probe) -> Iterator[str]:
         instance.start({}, probe.start)
         moments["after initialisation"] = instance.row(declared)
         kept = [v for v in probe.elements if v.variability in ("constant", "fixed") or v.causality == "parameter"]
-        before, points = instance.row(kept), probe.points(_FEW)
+        before, points = instance.row(kept), probe.points(PLAIN)
         steps = sum(1 for _ in itertools.takewhile(lambda point: instance.advance(*point), points))
         after = instance.row(kept)
     for v in declared:

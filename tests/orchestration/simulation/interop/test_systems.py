@@ -141,7 +141,11 @@ SAMPLING = "components.controller.sampling"
     ("name", "changes", "expected"),
     [
         ("water_tank", {}, "connections.valve.delay = 0.25: an SSP cannot express that; expected 0.0"),
-        ("water_tank", CARRIED["water_tank"], "tool = libcosim: no conversion of types, as of controller.valve"),
+        (
+            "water_tank",
+            CARRIED["water_tank"],
+            "tool = libcosim: connects a Real to a Real only, not controller.valve (Boolean to Real)",
+        ),
         ("double_integrator", {f"{SAMPLING}.period": 0.1}, f"{SAMPLING}.period = 0.1: an SSP has one step for all"),
         ("double_integrator", {f"{SAMPLING}.jitter": 0.01}, f"{SAMPLING}.jitter = 0.01: an SSP cannot express that"),
         ("double_integrator", {"stop_time": 0.33}, "stop_time = 0.33: expected a multiple of the common step of 0.05"),
