@@ -46,9 +46,8 @@ def study_table(study: Study, store: Path) -> PrintedTable:
             columns[_short(law)] = _texts(first[by].merge(group, how="left", on=by), "share")
         found = first[by].merge(differences_of(rows, names, laws), how="left", on=by)
         columns["difference"] = _texts(found, "difference")
-        caption += (
-            f"; difference: {_short(laws.second)} minus {_short(laws.first)}, with 95 % intervals by Newcombe's method"
-        )
+        minus = f"{_short(laws.second)} minus {_short(laws.first)}"
+        caption += f"; difference: {minus}, with 95 % intervals by Newcombe's method for pairs"
     if shares["low"].isna().any():
         caption += "; no interval where nothing is random"
     numbers = shares.astype(object).where(shares.notna(), None).to_dict("records")

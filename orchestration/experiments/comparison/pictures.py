@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import sizes
-from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
+from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
 from orchestration.experiments.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
@@ -21,7 +21,7 @@ from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps
 from orchestration.experiments.studies.figures import made, save
-from orchestration.experiments.studies.shares import GOOD, RANDOM
+from orchestration.experiments.studies.shares import GOOD, PAIR, RANDOM
 from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.style import SCREEN, Style
@@ -107,7 +107,9 @@ def _maps(comparison: Comparison, second: Axis, done: "pd.DataFrame", units: Map
     laws = Axis(name=CONTROLLER, targets=(), values=tuple(one.name for one in comparison.controllers))
     for (vehicle, condition), rows in table.groupby([VEHICLE, CONDITION], sort=False):
         for fate, has in FATES.items():
-            repeated = rows.assign(**{GOOD: has(rows), RANDOM: True})  # as initial conditions are drawn
+            repeated = rows.assign(
+                **{GOOD: has(rows), RANDOM: True, PAIR: rows[START]}
+            )  # as initial conditions are drawn
             draw = partial(_map, repeated, (comparison.axis, second), laws, _WORDS[fate], units)
             yield f"map_{fate}_{_file_name((vehicle, condition))}", draw
 

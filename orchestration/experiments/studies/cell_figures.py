@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from orchestration.experiments.studies.axes import Axis, Value
 from orchestration.experiments.studies.axis_labels import SCALES, edges, name_of, quantity_of
-from orchestration.experiments.studies.shares import GOOD, cells_of, differ
+from orchestration.experiments.studies.shares import GOOD, TwoLaws, cells_of, differences_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
@@ -106,15 +106,17 @@ def cell_maps(
     if filled is not None:
         title = _title(metric, words, units)
         figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
-    if len(groups) == 2:
-        _difference(figure, panels[2], places, groups, grids, axes, (x, y), metric)
+    if laws is not None and len(groups) == 2:
+        first, second = map(str, laws.values or ())
+        of_pairs = differences_of(table, _names(*axes, laws), TwoLaws(laws.name, first, second))
+        _difference(figure, panels[2], places, groups, grids, axes, (x, y), metric, of_pairs)
     for panel in panels[:count]:
         panel.set(xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale], xlabel=x.title)
         panel.xaxis.set_tick_params(labelbottom=True)
         mesh.name_cells(panel, *(q.of(sorted(axis.values or ())) for q, axis in zip((x, y), axes)))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
-    dots = "; dots: Newcombe's of the difference excludes 0" if metric == GOOD and len(groups) == 2 else ""
+    dots = "; dots: Newcombe's for pairs excludes 0" if metric == GOOD and len(groups) == 2 else ""
     repetitions = _repetitions(found, metric)
     figure.suptitle(style.lines_of(repetitions and repetitions + dots))
     handles: list[Patch | Line2D] = []
@@ -187,6 +189,7 @@ def _difference(
     axes: tuple[Axis, Axis],
     quantities: tuple[Quantity, Quantity],
     metric: str,
+    found: "pd.DataFrame",
 ) -> None:
     """The second law minus the first, with dots where the interval of the difference of the shares excludes 0."""
     difference = grids[1]["value"] - grids[0]["value"]
@@ -198,15 +201,9 @@ def _difference(
     panel.set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     if metric != GOOD:
         return
-    both = groups[0][1].merge(groups[1][1], on=_names(*axes), suffixes=(".0", ".1"))
-    columns = ("share", "low", "high")
-    marked = [
-        (row[axes[0].name], row[axes[1].name])
-        for _, row in both.iterrows()
-        if differ(*({name: row[f"{name}.{law}"] for name in columns} for law in (0, 1)))
-    ]
-    if marked:
-        x, y = (quantity.of(values) for quantity, values in zip(quantities, zip(*marked)))
+    marked = found[(found["low"] > 0.0) | (found["high"] < 0.0)]
+    if len(marked):
+        x, y = (quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes))
         panel.plot(x, y, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
 
 

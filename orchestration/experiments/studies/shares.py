@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.statistics import wilson
+from orchestration.foundation.basics.statistics import pair_correlation, wilson
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,12 +19,14 @@ GOOD = "good"
 
 RANDOM = "random"
 """Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
+PAIR = "paired by"
+"""Column of a table of runs: what runs of two cells that belong together have in common, as the seed"""
 
 
 def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
-    """The table of the runs of `study` with the column `RANDOM`.
+    """The table of the runs of `study` with the columns `RANDOM` and `PAIR`.
 
-    It is false in a cell whose system does not depend on the seed, if only the seed is repeated.
+    `RANDOM` is false in a cell whose system does not depend on the seed, if only the seed is repeated.
     """
     starts = study.files().start_values if study.needs_start_values else {}
     seeds_alone = all(axis.targets == ("seed",) for axis in study.axes if axis.name == study.repeat)
@@ -33,7 +35,8 @@ def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
         return not seeds_alone or study.system(int(cell.iloc[0]), starts).depends_on_seed
 
     cells = table.groupby([axis.name for axis in study.cell_axes], dropna=False)["design_index"]
-    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool)})
+    repeated = 0 if study.repeat is None else table[study.repeat]
+    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool), PAIR: repeated})
 
 
 def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "pd.DataFrame":
@@ -70,11 +73,13 @@ def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     return cells_of(table, by).drop(columns="value")
 
 
-def interval_of_difference(one: Mapping[str, float], other: Mapping[str, float]) -> tuple[float, float]:
-    """The 95 % interval of the share of one cell minus that of another, by Newcombe's method 10.
+def interval_of_difference(
+    one: Mapping[str, float], other: Mapping[str, float], *, correlation: float = 0.0
+) -> tuple[float, float]:
+    """The 95 % interval of the share of one cell minus that of another, by Newcombe's methods 10.
 
-    Runs with the same seed are taken as independent, which makes it wider than a paired one where they are alike. A
-    share without an interval is known exactly; of two such ones the difference has none either, but nan.
+    `correlation` is that of pairs of runs, such as those with the same seed; 0: independent runs. A share without an
+    interval is known exactly; of two such ones the difference has none either, but nan.
     """
     difference = one["share"] - other["share"]
     if math.isnan(one["low"]) and math.isnan(other["low"]):
@@ -83,15 +88,14 @@ def interval_of_difference(one: Mapping[str, float], other: Mapping[str, float])
         {**each, "low": each["share"], "high": each["share"]} if math.isnan(each["low"]) else each
         for each in (one, other)
     )
-    below = math.hypot(one["share"] - one["low"], other["high"] - other["share"])
-    above = math.hypot(one["high"] - one["share"], other["share"] - other["low"])
+    below = _apart(one["share"] - one["low"], other["high"] - other["share"], correlation)
+    above = _apart(one["high"] - one["share"], other["share"] - other["low"], correlation)
     return difference - below, difference + above
 
 
-def differ(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    """Whether that interval excludes 0."""
-    low, high = interval_of_difference(one, other)
-    return low > 0.0 or high < 0.0
+def _apart(one: float, other: float, correlation: float) -> float:
+    """The third side of a triangle with these two, whose angle has that cosine."""
+    return math.sqrt(one * one - 2.0 * correlation * one * other + other * other)
 
 
 class TwoLaws(NamedTuple):
@@ -112,17 +116,31 @@ def laws_of(table: "pd.DataFrame", by: Sequence[str]) -> TwoLaws | None:
 def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "pd.DataFrame":
     """The second law minus the first, by the values of the other axes: `difference`, `low` and `high`.
 
-    The columns `law` and `minus` have the laws.
+    The interval is of pairs: of runs with the same value of the axis that repeats, as the same seed. The columns `law`
+    and `minus` have the laws.
     """
     import pandas as pd
 
     axis, first, second = laws
     cells, others = shares_of(table, by), [name for name in by if name != axis]
     both = cells[cells[axis] == second].merge(cells[cells[axis] == first], on=others, suffixes=("", ".other"))
-    rows = []
+    correlations, rows = _correlations(table, others, laws), []
     for row in both.to_dict("records"):
         one, other = ({name: row[name + end] for name in ("share", "low", "high")} for end in ("", ".other"))
-        low, high = interval_of_difference(one, other)
+        correlation = correlations.get(tuple(row[name] for name in others), 0.0)
+        low, high = interval_of_difference(one, other, correlation=correlation)
         key = {"law": second, "minus": first, **{name: row[name] for name in others}}
         rows.append({**key, "difference": one["share"] - other["share"], "low": low, "high": high})
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["law", "minus", *others, "difference", "low", "high"])
+
+
+def _correlations(table: "pd.DataFrame", others: list[str], laws: TwoLaws) -> dict[tuple[Any, ...], float]:
+    """The correlation of the pairs of runs of both laws, by the values of the other axes."""
+    done = table[table["status"] == "done"]
+    one, other = (done.loc[done[laws.axis] == law, [*others, PAIR, "good"]] for law in (laws.second, laws.first))
+    found = {}
+    for key, rows in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others):
+        good, its = rows["good"].astype(bool), rows["good.other"].astype(bool)
+        counts = (int(each.sum()) for each in (good & its, good & ~its, ~good & its, ~good & ~its))
+        found[key] = pair_correlation(*counts)
+    return found

@@ -29,6 +29,18 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float
     return low, high
 
 
+def pair_correlation(both: int, only_one: int, only_other: int, neither: int) -> float:
+    """The correlation of successes in pairs, from the numbers of pairs, corrected for continuity as Newcombe's.
+
+    Newcombe, Statistics in Medicine 17 (1998) 2635-2650, method 10. It is 0 where one of both never varies.
+    """
+    one, other = (both + only_one, only_other + neither), (both + only_other, only_one + neither)
+    product, spread = float(both * neither - only_one * only_other), math.prod(one + other)
+    if product > 0.0:
+        product = max(product - 0.5 * sum(one), 0.0)
+    return product / math.sqrt(spread) if spread else 0.0
+
+
 class Estimate(NamedTuple):
     """An estimated quantile."""
 

@@ -120,7 +120,7 @@ function rowOfIndex(index) {
 function startTableOfRepeated() {
   byId("shares").hidden = false;
   byId("shares-title").textContent = "The cells as a table";
-  byId("shares-text").textContent = "Shares with Wilson intervals at 95 %, differences with those of Newcombe; none where nothing is random.";
+  byId("shares-text").textContent = "Shares with Wilson intervals at 95 %, differences with those of Newcombe, of laws for pairs of runs with the same seed, of studies for independent runs; none where nothing is random.";
   byId("shares-plot").hidden = true;
   const rows = report.repeated.maps.flatMap(({ title, cells: here }) => here.map((cell) => [`${title}: ${placeOfRepeated(cell)}`, cell.said]));
   byId("shares-table").replaceChildren(tableOf(rows, ["cell", "share and interval"]));

@@ -15,9 +15,9 @@ from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, lines
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
+    PAIR,
     TwoLaws,
     cells_of,
-    differ,
     differences_of,
     interval_of_difference,
     with_chance,
@@ -25,7 +25,7 @@ from orchestration.experiments.studies.shares import (
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.table import frame
-from orchestration.foundation.basics.statistics import wilson
+from orchestration.foundation.basics.statistics import pair_correlation, wilson
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.simulation.figures.names import COLUMNS
 from orchestration.simulation.figures.style import INCH, PAGE, STYLES
@@ -44,7 +44,8 @@ def runs() -> pd.DataFrame:
     rows = [
         {
             "controller": law, "timing.period": period, "timing.loss": loss, "seed": seed, "status": "done",
-            "random": True, "good": first or (period < 0.02 and seed < 3 * k), "position_rmse": 1.0 + seed,
+            "random": True, PAIR: seed, "good": first or (period < 0.02 and seed < 3 * k),
+            "position_rmse": 1.0 + seed,
         }
         for law, first in zip(LAWS.values or (), (True, False))
         for period in (0.01, 0.02)
@@ -80,26 +81,49 @@ def test_runs_that_no_criterion_judges_have_no_share() -> None:
         cells_of(runs().assign(good=pd.NA), ["timing.period"])
 
 
-def test_two_shares_differ_where_newcombes_interval_excludes_0() -> None:
-    # Newcombe (1998), table II: 56/70 against 48/80 has the interval .0524 to .3339, 9/10 against 3/10 .1705 to .8090,
-    # 10/10 against 0/20 .6791 to 1, 5/56 against 0/29 -.0381 to .1926
-    def cell(good: int, count: int) -> dict[str, float]:
-        low, high = wilson(good, count)
-        return {"share": good / count, "low": low, "high": high}
+def share_of(good: int, count: int) -> dict[str, float]:
+    low, high = wilson(good, count)
+    return {"share": good / count, "low": low, "high": high}
 
-    assert differ(cell(56, 70), cell(48, 80))
-    assert differ(cell(9, 10), cell(3, 10))
-    assert differ(cell(0, 20), cell(10, 10))
-    assert not differ(cell(5, 56), cell(0, 29))
-    assert interval_of_difference(cell(56, 70), cell(48, 80)) == pytest.approx((0.0524, 0.3339), abs=5e-5)
-    found = differences_of(
-        runs(),
-        ["controller", "timing.period", "timing.loss"],
-        TwoLaws("controller", "UnifiedController", "CascadedController"),
-    ).set_index(["timing.period", "timing.loss"])
+
+@pytest.mark.parametrize(
+    ("one", "other", "interval"),
+    [
+        ((56, 70), (48, 80), (0.0524, 0.3339)), ((9, 10), (3, 10), (0.1705, 0.8090)),
+        ((10, 10), (0, 20), (0.6791, 1.0)), ((5, 56), (0, 29), (-0.0381, 0.1926)),
+    ],
+)  # fmt: skip
+def test_the_interval_of_a_difference_is_newcombes(
+    one: tuple[int, int], other: tuple[int, int], interval: tuple[float, float]
+) -> None:
+    """Newcombe (1998), Statistics in Medicine 17, 873-890, table II."""
+    assert interval_of_difference(share_of(*one), share_of(*other)) == pytest.approx(interval, abs=5e-5)
+
+
+@pytest.mark.parametrize(("pairs", "interval"), [((36, 12, 2, 0), (0.0569, 0.3404)), ((1, 1, 7, 12), (-0.507, -0.026))])
+def test_the_interval_of_a_difference_of_pairs_is_newcombes(
+    pairs: tuple[int, int, int, int], interval: tuple[float, float]
+) -> None:
+    """Newcombe (1998), Statistics in Medicine 17, 2635-2650; Fagerland, Lydersen and Laake (2014), of Bentur's data."""
+    both, only_one, only_other, _ = pairs
+    shares = (share_of(both + only, sum(pairs)) for only in (only_one, only_other))
+    found = interval_of_difference(*shares, correlation=pair_correlation(*pairs))
+    assert found == pytest.approx(interval, abs=6e-5 if pairs[0] > 1 else 6e-4)
+
+
+def test_the_interval_of_a_difference_of_two_laws_is_newcombes_for_pairs() -> None:
+    names, laws = ["controller", "timing.period", "timing.loss"], TwoLaws("controller", *map(str, LAWS.values or ()))
+    place = ["timing.period", "timing.loss"]
+    found = differences_of(runs(), names, laws).set_index(place)
     assert found.loc[(0.01, 0.1), "difference"] == 3 / 8 - 1.0
-    expected = interval_of_difference(cell(3, 8), cell(8, 8))
+    expected = interval_of_difference(share_of(3, 8), share_of(8, 8))  # one of them never varies
     assert tuple(found.loc[(0.01, 0.1), ["low", "high"]]) == expected
+    alike = runs().assign(good=lambda table: table["seed"] < 3 + (table["controller"] == LAWS.values[0]))  # type: ignore[index]
+    found = differences_of(alike, names, laws).set_index(place)
+    low, high = interval_of_difference(share_of(3, 8), share_of(4, 8))
+    assert low < found.loc[(0.01, 0.1), "low"] < found.loc[(0.01, 0.1), "high"] < high
+    pairless = differences_of(alike.assign(**{PAIR: range(len(alike))}), names, laws).set_index(place)
+    assert tuple(pairless.loc[(0.01, 0.1), ["low", "high"]]) == (low, high)
 
 
 def test_a_cell_in_which_nothing_is_random_has_no_interval_and_no_dot() -> None:
@@ -114,7 +138,7 @@ def test_a_cell_in_which_nothing_is_random_has_no_interval_and_no_dot() -> None:
     assert "; one where nothing is random; " in figure.get_suptitle()
     exact, good = ({"share": 1.0, "low": low, "high": 1.0} for low in (np.nan, 0.7))
     assert interval_of_difference(good, exact) == pytest.approx((-0.3, 0.0))
-    assert not differ(exact, {**exact, "share": 0.0})
+    assert np.isnan(interval_of_difference(exact, {**exact, "share": 0.0})).all()
 
 
 def test_only_cells_whose_system_depends_on_the_seed_are_random() -> None:
@@ -138,7 +162,7 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
     assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
     assert figure.get_suptitle() == (
-        "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; dots: Newcombe's of the difference excludes 0"
+        "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; dots: Newcombe's for pairs excludes 0"
     )
 
 

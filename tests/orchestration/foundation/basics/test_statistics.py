@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.foundation.basics.statistics import first_end, quantile, refutes, wilson
+from orchestration.foundation.basics.statistics import first_end, pair_correlation, quantile, refutes, wilson
 from quadcosim import UsageError
 
 
@@ -29,6 +29,12 @@ def test_published_values() -> None:
         (81, 263): (0.2553, 0.3662), (15, 148): (0.0624, 0.1605), (0, 20): (0.0, 0.1611), (1, 29): (0.0061, 0.1718),
     }.items():  # fmt: skip
         assert wilson(seen, trials) == pytest.approx(ends, abs=5e-5)
+
+
+def test_the_correlation_of_pairs_is_that_of_their_table_towards_0() -> None:
+    assert pair_correlation(36, 12, 2, 0) == -24 / math.sqrt(48 * 2 * 38 * 12)
+    assert pair_correlation(20, 12, 2, 16) == (20 * 16 - 12 * 2 - 25) / math.sqrt(32 * 18 * 22 * 28)
+    assert pair_correlation(1, 1, 0, 1) == pair_correlation(5, 0, 0, 0) == 0.0
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.97])
