@@ -9,13 +9,29 @@ from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.times import exact_nanoseconds
+from orchestration.simulation.engines.master import Master
 from orchestration.simulation.runs.prepared import prepared
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed
-from orchestration.theory.stability.linearised_component import Tangent
+from orchestration.systems.system.paths import changed, parameter_name
+from orchestration.theory.stability.linearised_component import LINEAR, Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest, tracing_loader
 from orchestration.theory.stability.matrices import Components
-from orchestration.theory.stability.operating_point import deterministic
+from orchestration.theory.stability.operating_point import deterministic, exchanged_signals
+
+SMALLER = 0.1
+"""Factor of a deviation from one in which coordinates are measured to the next"""
+EXACT = 1e-9
+"""Error of coordinates, relative, up to which no smaller deviation is tried"""
+TOLERATED = 0.01
+"""Error of a quadratic cost by what is not linear from the initial state on, relative, up to which it is told"""
+HALVINGS = 20
+"""Halves of the initial deviation that are tried for one that is linear, at most"""
+FLOWN = 1000
+"""Periods over which runs from the initial state and from half of it are compared, at most"""
+ROUNDED = 1e-12
+"""Deviation of a signal, relative to its value where above 1, that may be rounding"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +44,8 @@ class InitialState:
     """likewise"""
     received: Mapping[str, Floats]
     """Received values by connection"""
+    accuracy: float
+    """Error of quadratic costs from here, relative: of the coordinates, and by what is not linear"""
 
 
 def initial_state_of(
@@ -35,7 +53,8 @@ def initial_state_of(
 ) -> InitialState:
     """The initial state of `system`, in the coordinates of the components `parts` of its loop at rest.
 
-    Raises `UsageError` where it is outside of the linear range.
+    Runs from it and from half of it, to the `stop_time`, show how linear the loop is. Raises `UsageError` where that
+    is too little, naming the share of the deviation from which it is linear enough.
     """
     _expect_same_sources(system)
     calm = deterministic(replace(system, operating_point={}))
@@ -43,7 +62,40 @@ def initial_state_of(
         name: one if one.sampling is None else replace(one, sampling=replace(one.sampling, offset=0.0))
         for name, one in calm.components.items()
     }
-    with prepared(replace(calm, components=prompt), load=tracing_loader(instances)) as run:
+    prompt_system, deviations = replace(calm, components=prompt), _deviations(system, calm, instances)
+    found, worst = _measured(prompt_system, loop, parts, tangents, instances)
+    if not deviations:  # it rests there, as nearly as it comes to rest
+        found = replace(found, accuracy=0.0)
+    factor = SMALLER
+    while found.accuracy > EXACT:
+        start = _scaled(prompt_system, deviations, factor)
+        smaller, name = _measured(start, loop, parts, tangents, instances, factor)
+        if smaller.accuracy >= found.accuracy:
+            break
+        found, worst, factor = smaller, name, SMALLER * factor
+    if not found.accuracy <= LINEAR:
+        raise UsageError(
+            f"{worst}: its initial state is not linear about its operating point: expected initial values near it that "
+            "its inputs could reach"
+        )
+    # A share of a deviation that is not linear is off by at least half as much less, and a square by twice as much.
+    nonlinear = 4.0 * _nonlinearity(calm, deviations, loop, instances) if deviations else 0.0
+    return replace(found, accuracy=2.0 * found.accuracy + nonlinear)
+
+
+def _measured(
+    system: System,
+    loop: AtRest,
+    parts: Components,
+    tangents: Mapping[str, Tangent],
+    instances: Instances,
+    factor: float = 1.0,
+) -> tuple[InitialState, str]:
+    """The initial state of `system`, divided by `factor`, and the component with the largest error.
+
+    Its `accuracy` is that of the coordinates.
+    """
+    with prepared(system, load=tracing_loader(instances)) as run:
         run.master.initialise()
         if run.master.divergence is not None:
             raise UsageError(f"it diverges at its initialisation: {run.master.divergence}")
@@ -54,11 +106,80 @@ def initial_state_of(
         loop.simulation.instances[name].restore(state)
     rest = {name: _outputs(loop.simulation.instances[name], part.outputs) for name, part in parts.items()}
     received_at_rest = [channel.received for channel in loop.simulation.master.running.channels]
-    return InitialState(
-        states={name: tangents[name].coordinates_of(saved[name]) for name in parts},
-        outputs={name: outputs[name] - rest[name] for name in parts},
-        received={x.name: now - then for x, now, then in zip(system.connections, received, received_at_rest)},
+    measured = {name: tangents[name].coordinates_of(saved[name]) for name in parts}
+    worst = max(measured, key=lambda name: measured[name][1])
+    size = max(size for _, _, size in measured.values())
+    found = InitialState(
+        states={name: coordinates / factor for name, (coordinates, _, _) in measured.items()},
+        outputs={name: (outputs[name] - rest[name]) / factor for name in parts},
+        received={
+            x.name: (now - then) / factor for x, now, then in zip(system.connections, received, received_at_rest)
+        },
+        accuracy=measured[worst][1] / size if size > 0.0 else 0.0,
     )
+    return found, worst
+
+
+def _deviations(system: System, calm: System, instances: Instances) -> dict[str, tuple[float, float]]:
+    """The real parameters that differ from the operating point, by path: their values there, and here."""
+    named = {path: name for path in system.operating_point if (name := parameter_name(path)) is not None}
+    found = {}
+    with prepared(calm, load=tracing_loader(instances)) as run:
+        run.master.initialise()
+        for path, name in named.items():
+            instance = run.instances[component_of(name)]
+            there = system.operating_point[path]
+            if instance.model.variables[variable_of(name)].kind == "Real":
+                here = float(instance.get(variable_of(name)))
+                if here != there:
+                    found[path] = float(there), here
+    return found
+
+
+def _scaled(system: System, deviations: Mapping[str, tuple[float, float]], factor: float) -> System:
+    return changed(system, {path: there + factor * (here - there) for path, (there, here) in deviations.items()})
+
+
+def _nonlinearity(
+    calm: System, deviations: Mapping[str, tuple[float, float]], loop: AtRest, instances: Instances
+) -> float:
+    """By how much signals that start from all of the deviation are not twice those from half of it, relative."""
+    rest = np.array(_exchanged(loop.simulation.master, calm))
+    weight = ROUNDED * np.maximum(1.0, np.abs(rest))
+    whole = _flown(calm, loop, instances) - rest
+    for halving in range(HALVINGS):
+        half = _flown(_scaled(calm, deviations, 0.5 ** (halving + 1)), loop, instances) - rest
+        if len(whole) == len(half):
+            size, apart = (np.abs(x).max(axis=0) for x in (whole, whole - 2.0 * half))
+            found = float((np.maximum(apart - weight, 0.0) / np.maximum(size, weight)).max(initial=0.0))
+            if 4.0 * found <= TOLERATED:
+                if halving == 0:
+                    return found
+                break
+        whole = half
+    else:
+        raise UsageError("its initial state is not linear about its operating point: nor are small shares of it")
+    raise UsageError(
+        f"its initial state is not linear about its operating point: expected initial values at most "
+        f"{0.5**halving:.3g} times as far from it, from which costs are linear to {TOLERATED:.0%}"
+    )
+
+
+def _flown(system: System, loop: AtRest, instances: Instances) -> Floats:
+    """The exchanged signals at the begin of each period until the end of the run."""
+    count = min(int(exact_nanoseconds(system.stop_time) / loop.period), FLOWN)
+    with prepared(system, load=tracing_loader(instances)) as run:
+        run.master.initialise()
+        rows = [_exchanged(run.master, system)]
+        for k in range(1, count + 1):
+            if run.master.run(pause_at=round(k * loop.period)) and run.master.divergence is not None:
+                break
+            rows.append(_exchanged(run.master, system))
+    return np.array(rows, dtype=float)
+
+
+def _exchanged(master: Master, system: System) -> list[float]:
+    return [master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)]
 
 
 def _outputs(instance: Instance, names: tuple[str, ...]) -> Floats:

@@ -71,7 +71,7 @@ class Converged(Generic[T]):
     period: float
     """Period [s]"""
     difference: float
-    """change by the last doubling of the nodes, relative"""
+    """change by the last doubling of the nodes, relative, and the error of the initial state"""
     order: int | None
     """Order of Gauss's rule; None: all random times are enumerated"""
 
@@ -172,7 +172,7 @@ class Loops:
     def solve_to(self, system: System, horizon: float) -> Converged[Mapping[Call, float]]:
         """The means of a system from its initial state to `horizon` [s], as `solve`."""
         rests = changed(system, system.operating_point)
-        linear = self.linear(rests, initial=system)
+        linear = self.linear(rests, initial=replace(system, stop_time=horizon))
         used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q) or np.any(mean.g)]
         effects = self._effects(rests, linear, used, with_means=True)
         assert linear.initial is not None
@@ -183,7 +183,9 @@ class Loops:
             costs = costs_until(chain, start, constant, end) / (end / ATTOSECONDS) if used else np.zeros(0)
             return _with_costs(linear, used, costs.tolist()), costs
 
-        return self._refined(self._tasks_and_links(rests, linear, effects, horizon), effects, answer, ORDER_TOLERANCE)
+        timing = self._tasks_and_links(rests, linear, effects, horizon)
+        found = self._refined(timing, effects, answer, ORDER_TOLERANCE)
+        return replace(found, difference=found.difference + linear.initial.accuracy)
 
     def _refined(
         self,

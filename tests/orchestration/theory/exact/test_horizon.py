@@ -3,14 +3,18 @@
 import dataclasses
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from orchestration.components.scaffold.folder import write
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import Criterion
-from orchestration.theory.exact.expect import expect
+from orchestration.systems.system.paths import changed
+from orchestration.theory.exact.expect import Expected, expect
 from quadcosim import UsageError, run
 from tests.commands import Main
 from tests.examples.common import native_example as example
@@ -141,8 +145,26 @@ def test_a_start_at_which_a_component_is_not_linear_is_refused_by_name() -> None
         servo, objectives={"cost": "mean(servo.angle ** 2)"},
         operating_point={**dict.fromkeys(("components.servo.parameters.initial.angle", speed), 0.0), constant: 2.0},
     )  # fmt: skip
-    with pytest.raises(UsageError, match=r"servo: its initial state is not linear about its operating point"):
+    with pytest.raises(UsageError, match=r"its initial state is not linear .* at most 0.00781 times as far"):
         expect(driven, horizon=1.0)
+
+
+def test_the_cost_from_a_pendulum_that_leans_is_linear_theory_and_says_how_far_it_is_off(tmp_path: Path) -> None:
+    write("plant", "pendulum", tmp_path, author="Ada", license="MIT")
+    objectives = {"cost": "mean((plant.angle - 3.141592653589793) ** 2)"}
+    upright = dataclasses.replace(
+        load_system(tmp_path / "pendulum" / "system.toml"), objectives=objectives, criterion=Criterion()
+    )
+
+    def leaning(by: float) -> Expected:
+        return expect(changed(upright, {"components.plant.parameters.initial.angle": math.pi + by}), horizon=1.0)
+
+    little, far = leaning(1e-5), leaning(0.1)
+    costs = [one.objectives["cost"] or math.nan for one in (little, far)]
+    assert costs[0] * 1e8 == pytest.approx(costs[1], rel=1e-6)
+    assert little.accuracy < 1e-6 < 1e-4 < far.accuracy < 1e-2
+    with pytest.raises(UsageError, match=r"expected initial values at most 0\.\d+ times as far from it"):
+        leaning(1.0)
 
 
 @pytest.mark.parametrize("horizon", [0.0, -1.0, math.inf, math.nan])
