@@ -178,6 +178,14 @@ def slave_class(target: Target) -> Any:
         raise PackagingError(str(error)) from error
     if "description" not in vars(slave):
         raise PackagingError(f"{target.module}:{target.model}: expected a docstring or a description")
+    try:
+        inspect.signature(slave).bind(instance_name=target.model, resources="")
+    except TypeError as error:
+        raise PackagingError(
+            f"{target.module}:{target.model}.__init__: {error}: expected none, as memory from step to step is a Local "
+            "and what follows from parameters is computed in read_parameters; or (self, **kwargs), passed on to "
+            "super().__init__"
+        ) from error
     return slave if target.variant is None else _variant(slave, target.variant)
 
 

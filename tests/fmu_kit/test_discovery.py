@@ -6,6 +6,7 @@ import pytest
 
 from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.discovery import slave_beside, slaves_in
+from fmu_kit.packaging import slave_class
 from tests.places import ROOT
 
 TANK = """
@@ -116,3 +117,13 @@ def test_a_source_that_is_no_python_is_named_with_its_line(folder: Path) -> None
     (folder / "bad.py").write_text("x = 1\ndef f(:\n", encoding="utf-8")
     with pytest.raises(PackagingError, match=r"bad\.py:2: invalid syntax; expected Python$"):
         slaves_in(folder)
+
+
+def test_a_law_whose_init_takes_nothing_is_refused_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "begun.py").write_text(
+        'from fmu_kit.slave import Slave\n\n\nclass Begun(Slave):\n    """A law."""\n\n'
+        "    def __init__(self):\n        super().__init__()\n\n    def step(self, t, h):\n        pass\n"
+    )
+    with pytest.raises(PackagingError, match=r"begun:Begun\.__init__: .*: expected none, .* is a Local"):
+        slave_class(Target.parse("begun:Begun"))
