@@ -234,8 +234,10 @@ def _note(
         parts.append(f"scanned {where}: beyond that nothing is known")
     if found.lower is not None:
         parts.append(f"below {found.lower:.6g}{span.unit} small deviations grow, too")
+    if found.reason:
+        parts.append(found.reason)
     if local is None:
-        return [*parts, found.reason]
+        return parts
     measured = None if bracket is None else bracket.good
     if measured is None:
         return [*parts, f"the local limit is {local:.6g}{span.unit}"]

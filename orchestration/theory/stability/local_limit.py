@@ -1,12 +1,14 @@
 """Local limits: where small deviations from an operating point cease to decay."""
 
+import math
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import partial
 
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.bisection import Range, ends_of_good
+from orchestration.foundation.basics.bisection import Bracket, Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
@@ -15,7 +17,14 @@ from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
 from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearise import known_to
 from orchestration.theory.stability.loop_at_rest import KnownTangents
-from orchestration.theory.stability.operating_point import NotAnEquilibriumError, deterministic
+from orchestration.theory.stability.operating_point import (
+    LONGEST_HYPERPERIOD,
+    NotAnEquilibriumError,
+    deterministic,
+    hyperperiod,
+    hyperperiod_of,
+    periods_of,
+)
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
 
@@ -34,8 +43,21 @@ AGREE = 0.1
 NEAR = 0.1
 """Distance from the limit at which it has to, relative"""
 
+MOST_MULTIPLES = 200
+"""Most multiples of the other periods that are tried beside the values of the scan"""
+
 Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Commensurate:
+    """Values at which a loop of several rates repeats: of one that varies, only there it has a spectral radius."""
+
+    scan: list[float]
+    """the scan's own that are, and multiples of the other periods, at which it may be unstable between stable ones"""
+    fine: list[float]
+    """candidates between them"""
 
 
 def local_limits(varied: Varied, span: Range) -> LinearLimit:
@@ -65,6 +87,8 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
         return LinearLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
+    if _commensurate(at, span) is not None:
+        return LinearLimit(reason=f"no local limit: several rates, and saved states do not suffice: {why}")
     try:
         found = _by_twins(at, span)
     except (UsageError, SimulatorError) as error:
@@ -80,7 +104,8 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         growths[value] = found = growth_of_loop(at(value), instances, known=known)
         return found
 
-    found = _first_growth(growth, span, LOOP_TOLERANCE, LOOP)
+    rates = _commensurate(at, span)
+    found = _first_growth(growth, span, LOOP_TOLERANCE, LOOP) if rates is None else _first_tried(growth, span, rates)
     if found.limit is None or found.accuracy is None:
         return found
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
@@ -125,6 +150,62 @@ def _near(end: float, span: Range) -> tuple[float, float]:
 
 def _rate(at: Callable[[float], System], instances: Instances, factor: float, value: float) -> float:
     return growth_of(at(value), instances, factor).rate
+
+
+def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | None:
+    """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period."""
+    first, last = (periods_of(at(value)) for value in (span.first, span.last))
+    others = sorted({b for a, b in zip(first, last) if a == b})
+    varied = [b for a, b in zip(first, last) if a != b]
+    if not varied or not others:
+        return None
+
+    values = span.values()
+
+    def multiples(period: Fraction) -> list[float]:
+        step = float(period / varied[0]) * span.last
+        counts = range(math.ceil(values[0] / step), math.floor(span.last / step) + 1)
+        return [float(f"{k * step:.12g}") for k in counts]
+
+    added = sorted({value for period in others for value in multiples(period)})
+    few = added[:: math.ceil(len(added) / MOST_MULTIPLES)] if added else added
+    scan = [value for value in sorted({*values, *few}) if hyperperiod_of(at(value)) is not None]
+    return Commensurate(scan=scan, fine=multiples(hyperperiod(others) / LONGEST_HYPERPERIOD))
+
+
+def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimit:
+    """The first value at which small deviations grow, of those tried, up and down from the system's own."""
+    if not rates.scan:
+        return LinearLimit(reason="no local limit: several rates, which repeat together at no value of the scan")
+    ends = ends_of_good(lambda value: growth(value) > 0.0, rates.scan, span.own, span.last)
+    lower, upper = (None if end is None or end.good is None else _narrowed(growth, end, rates.fine) for end in ends)
+    bad = upper.bad if upper is not None else None if ends.upper is None else ends.upper.bad
+    first = "none is unstable" if bad is None else f"the first unstable value tried is {bad:.6g}{span.unit}"
+    reason = (
+        f"local: {first}, of {len(rates.scan)} from {rates.scan[0]:.6g} to {rates.scan[-1]:.6g}{span.unit} at which "
+        "the several rates repeat together: stability need not be an interval, and others between may be unstable"
+    )
+    limit = _middle(upper)
+    accuracy = None if upper is None or upper.good is None else 0.5 * (upper.bad - upper.good)
+    return LinearLimit(limit=limit, lower=_middle(lower), method=LOOP, accuracy=accuracy, reason=reason)
+
+
+def _middle(bracket: Bracket | None) -> float | None:
+    return None if bracket is None or bracket.good is None else 0.5 * (bracket.good + bracket.bad)
+
+
+def _narrowed(growth: Growth, bracket: Bracket, fine: list[float]) -> Bracket:
+    """The bracket bisected by the values of `fine` within it."""
+    good, bad = bracket
+    assert good is not None
+    between = sorted((x for x in fine if min(good, bad) < x < max(good, bad)), reverse=bad < good)
+    while between:
+        half = len(between) // 2
+        if growth(between[half]) > 0.0:
+            bad, between = between[half], between[:half]
+        else:
+            good, between = between[half], between[half + 1 :]
+    return Bracket(good, bad)
 
 
 def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LinearLimit:

@@ -57,12 +57,12 @@ def _punctual(component: Component) -> Component:
 
 def longest_period(system: System) -> Fraction:
     """The longest period of sampled components, or the longest step where none is sampled [ns]."""
-    return max(_periods(system))
+    return max(periods_of(system))
 
 
 def hyperperiod_of(system: System) -> Fraction | None:
     """The hyperperiod of all sampled components [ns]; None: none within `LONGEST_HYPERPERIOD`."""
-    periods = _periods(system)
+    periods = periods_of(system)
     found = hyperperiod(periods)
     return found if found <= LONGEST_HYPERPERIOD * max(periods) else None
 
@@ -73,7 +73,8 @@ def hyperperiod(periods: Sequence[Fraction]) -> Fraction:
     return Fraction(math.lcm(*(int(period * denominator) for period in periods)), denominator)
 
 
-def _periods(system: System) -> list[Fraction]:
+def periods_of(system: System) -> list[Fraction]:
+    """The periods of sampled components, or the steps of all where none is sampled [ns]."""
     return [one.sampling.true_period for one in system.components.values() if one.sampling is not None] or [
         exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None
     ]

@@ -7,7 +7,7 @@ import pytest
 
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import local_limit
 from orchestration.theory.stability.perturbed_runs import Growth
@@ -51,3 +51,33 @@ def test_a_pulse_that_rounding_blurs_is_not_believed(
     found = local_limit.about_rest(at, SPAN)
     assert found.limit == (limit if limit is None else pytest.approx(limit, abs=1e-2))
     assert ("depends on how small they are" in found.reason) == (limit is None)
+
+
+def test_a_period_among_several_rates_has_no_limit_beyond_a_value_that_is_unstable(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Between 0.15 and 0.2, both stable, a multiple of the other period is unstable, and what is just below it not."""
+
+    def two(period: float) -> System:
+        components = {
+            name: Component(fmu=f"{name}.fmu", sampling=Sampling(period=each))
+            for name, each in (("law", period), ("servo", 0.008))
+        }
+        return System(stop_time=9.0, components=components)
+
+    def growth(system: System, *_: Any, **__: Any) -> float:
+        sampling = system.components["law"].sampling
+        assert sampling is not None
+        return 1.0 if 0.1915 < sampling.period < 0.195 or sampling.period > 0.9 else -1.0
+
+    monkeypatch.setattr(local_limit, "growth_of_loop", growth)
+    found = local_limit.about_rest(two, SPAN)
+    assert found.limit is not None
+    assert found.accuracy is not None
+    assert (found.limit - found.accuracy, found.limit + found.accuracy) == pytest.approx((0.1912, 0.1916))
+    assert "the first unstable value tried is 0.1916 s" in found.reason
+    none = local_limit.about_rest(two, replace(SPAN, last=0.15))
+    assert none.limit is None
+    assert none.reason.startswith("local: none is unstable, of 19 from 0.05 to 0.15 s")
+    monkeypatch.setattr(local_limit, "hyperperiod_of", lambda system: None)
+    assert "at no value of the scan" in local_limit.about_rest(two, SPAN).reason
