@@ -42,7 +42,7 @@ def pair_correlation(both: int, only_one: int, only_other: int, neither: int) ->
 
 
 class Estimate(NamedTuple):
-    """An estimated quantile."""
+    """An estimated quantile or share."""
 
     value: float
     low: float

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import Named
+from orchestration.foundation.basics.errors import Named, UsageError
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.statistics import Estimate, wilson
 from orchestration.simulation.results.objectives import OUTCOME, how_runs_ended
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ class Flights(Mapping[str, Any]):
     reason: str | None
     """Why they did not run in lanes, in a line; None: they did."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """The units of the outputs that have one, by name, as FMI writes them (`N.m`)."""
+    """The units of the outputs and of the given values that have one, by name, as FMI writes them (`N.m`)."""
 
     def __getitem__(self, name: str) -> Any:
         """The array of a name."""
@@ -54,6 +55,17 @@ class Flights(Mapping[str, Any]):
         """How many runs have ended in which way; without the output `outcome` only how many there are."""
         outcomes = Counter(np.asarray(self.arrays.get(OUTCOME, ())).ravel().tolist())
         return how_runs_ended(outcomes, int(np.prod(self.shape, dtype=int)))
+
+    def share(self, name: str = "good") -> Estimate:
+        """The share of runs of which an output is true, with Wilson's interval at 95 %.
+
+        Raises `UsageError` for an output that is no truth value in each run.
+        """
+        values = self[name]
+        if values.dtype != np.bool_:
+            raise UsageError(f"share of {name}: expected an output that is true or false in each run, as good")
+        low, high = wilson(int(values.sum()), values.size)
+        return Estimate(value=float(values.mean()), low=low, high=high, confidence=0.95)
 
     def __repr__(self) -> str:
         return f"<Flights: {np.prod(self.shape, dtype=int)} runs by {self.engine}; {', '.join(self.arrays)}>"

@@ -25,6 +25,7 @@ from orchestration.simulation.engines.resolved import (
     numeric_parameters,
     source_signals,
 )
+from orchestration.simulation.requests.ranges import unit_at
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import FIXED, OUTCOME, Metrics
 from orchestration.simulation.runs.arguments import names_in
@@ -93,10 +94,11 @@ def fly(
                 report(done, runs.count)
     engine = table.engine if reason else BATCH
     _NOTES.debug("%d runs by the engine %s%s", runs.count, engine, f": {reason}" if reason else "")
-    known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units}
+    of_given = {target: unit_at(loaded.paths_of(target)[0], models) for target in runs.given}
+    known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units, **of_given}
     return Flights(
         arrays=table.arrays, given=runs.given, recorded=table.recorded, shape=runs.shape, engine=engine, reason=reason,
-        units={name: known[name] for name in table.arrays if name in known},
+        units={name: unit for name in (*runs.given, *table.arrays) if (unit := known.get(name))},
     )  # fmt: skip
 
 

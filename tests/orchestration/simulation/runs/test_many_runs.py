@@ -61,6 +61,10 @@ def test_a_local_that_no_run_records_unasked_can_be_recorded_of_the_runs_of_a_ta
         SHORT, table, outputs=["good"], record=["controller.sample_count"], progress=lambda *of: done.append(of)
     )
     assert done == [(1, 2), (2, 2)]
+    assert not found["good"].any()
+    assert found.share("good") == pytest.approx((0.0, 0.0, 0.657620, 0.95), abs=1e-5)
+    with pytest.raises(QuadcosimError, match=r"^share of time: expected an output that is true or false in each run"):
+        found.share("time")
     assert found["controller.sample_count"][0, [0, -1]].tolist() == [1.0, 50.0]
 
 
@@ -131,7 +135,9 @@ def test_arrays_of_any_shape_broadcast_and_become_the_axes_of_a_dataset() -> Non
     assert [*table] == [*values, "outcome", "tilt_max", "steps"]
     assert table["timing.period"].tolist() == [0.01] * 3 + [0.02] * 3
     assert table["tilt_max"].tolist() == found["tilt_max"].reshape(-1).tolist()
-    assert table.attrs["units"]["tilt_max"] == "rad"
+    units = {"timing.period": "s", X: "m", Y: "m", "tilt_max": "rad"}
+    assert {name: table.attrs["units"].get(name) for name in (*units, "seed")} == {**units, "seed": None}
+    assert {name: dataset[name].attrs["units"] for name in units} == units
     shown = found._repr_html_()
     assert found.verdict in shown
     assert "<th>tilt_max</th>" in shown
