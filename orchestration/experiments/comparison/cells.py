@@ -50,6 +50,10 @@ class Median:
         estimate = quantile(known, confidence=confidence)
         return cls(value=estimate.value, low=_finite(estimate.low), high=_finite(estimate.high))
 
+    def columns(self, name: str) -> dict[str, float | None]:
+        """The columns of a table for the median of a quantity of this name."""
+        return {name: self.value, f"{name}.low": self.low, f"{name}.high": self.high}
+
     def is_near(self, other: "Median", tolerance: float) -> bool:
         """Whether it equals another median within a relative tolerance."""
         pairs = ((getattr(self, key), getattr(other, key)) for key in ("value", "low", "high"))
@@ -96,7 +100,7 @@ class CellSummary(Case):
             values |= {f"{name}.high": share.high}
         values |= {"diverged": self.diverged, "diverged_late": self.diverged_late}
         for name, median in self.medians.items():
-            values |= {name: median.value, f"{name}.low": median.low, f"{name}.high": median.high}
+            values |= median.columns(name)
         return values
 
 

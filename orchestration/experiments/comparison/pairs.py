@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.comparison.cells import Median
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
@@ -37,6 +37,10 @@ class Pair:
     effort: Median
     """medians of the ratio of its value to that of the first where both survive; the intervals hold for all pairs of
     the comparison together (Bonferroni)"""
+
+    def row(self) -> dict[str, Any]:
+        """The row of the table."""
+        return {**vars(self), **self.error.columns("error"), **self.effort.columns("effort")}
 
 
 def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:

@@ -121,18 +121,20 @@ class Compared:
         return Figures(pictures.figures_of(self.comparison, self.outcome, self.table, chosen, units=units), chosen)
 
     @explains_missing
-    def to_pandas(self, what: Literal["cells", "limits", "runs"] = "cells") -> "pd.DataFrame":
-        """A row for each cell: counts of runs that survive and settle, medians; or the limits, or the runs.
+    def to_pandas(self, what: Literal["cells", "limits", "pairs", "runs"] = "cells") -> "pd.DataFrame":
+        """A row for each cell: counts of runs that survive and settle, medians; or the limits, the pairs, or the runs.
 
         Raises `UsageError` for another name.
         """
         import pandas as pd
 
-        expect_one_of("what", what, ("cells", "limits", "runs"))
+        expect_one_of("what", what, ("cells", "limits", "pairs", "runs"))
         if what == "runs":
             return self.table
-        listed = self.outcome.limits if what == "limits" else self.outcome.cells
-        return pd.DataFrame([one.row() if isinstance(one, CellSummary) else vars(one) for one in listed])
+        if what == "limits":
+            return pd.DataFrame([vars(one) for one in self.outcome.limits])
+        rows = [one.row() for one in (self.outcome.pairs if what == "pairs" else self.outcome.cells)]
+        return pd.DataFrame(rows)
 
 
 @needs("filelock", "pandas")

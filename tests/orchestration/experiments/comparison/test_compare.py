@@ -119,8 +119,11 @@ def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
     found = quadcosim.compare(native, folder=folder / "out", figures=False, progress=None, announce=None)
     assert found.summary.flown == 0
     assert found.verdict.startswith("from half of the starts, over period: coupled survives ")
-    with pytest.raises(UsageError, match=r"what = 'pairs': .*expected one of cells, limits, runs"):
-        found.to_pandas("pairs")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"what = 'fronts': .*expected one of cells, limits, pairs, runs"):
+        found.to_pandas("fronts")  # type: ignore[arg-type]
+    pairs = found.to_pandas("pairs")
+    assert pairs["both"].tolist() == [one.both for one in found.outcome.pairs]
+    assert pairs["error.low"].count() == sum(one.error.low is not None for one in found.outcome.pairs)
     assert {*found.plot(style="paper")} == {path.stem for path in (folder / "out").glob("*.png")}
 
 
