@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from orchestration.experiments.comparison.design import START, Case, Comparison
+from orchestration.experiments.comparison.design import CONDITION, START, Case, Comparison
 from orchestration.experiments.comparison.survival import RESIDUAL, SETTLING, diverged_late, settled, survived
 from orchestration.experiments.studies.axes import Value
 from orchestration.foundation.basics.statistics import quantile, wilson
@@ -151,6 +151,16 @@ def table_of_runs(comparison: Comparison, rows: Iterable[tuple[int, dict[str, An
         for index, metrics in rows
     ]
     return pd.DataFrame(listed)
+
+
+def with_second_axis(comparison: Comparison, table: "pd.DataFrame") -> "pd.DataFrame":
+    """A table of runs with a column of the second axis after that of the first, if there is one."""
+    if comparison.second is None:
+        return table
+    table = table.copy()
+    values = table[CONDITION].map({name: one.value for name, one in comparison.on_second.items()})
+    table.insert(table.columns.get_loc(comparison.axis.name) + 1, comparison.second.name, values)
+    return table
 
 
 def sizes(comparison: Comparison, table: "pd.DataFrame") -> "pd.Series":

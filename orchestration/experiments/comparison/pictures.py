@@ -102,8 +102,7 @@ def _of_one(
 def _maps(comparison: Comparison, second: Axis, done: "pd.DataFrame", units: Mapping[str, str]) -> Iterator[Picture]:
     """The share that survives, and that settles, over both axes, for each vehicle under each condition of the file."""
     stands_for = {name: one.condition for name, one in comparison.on_second.items()}
-    values = {name: one.value for name, one in comparison.on_second.items()}
-    table = done.assign(**{second.name: done[CONDITION].map(values), CONDITION: done[CONDITION].map(stands_for)})
+    table = done.assign(**{CONDITION: done[CONDITION].map(stands_for)})
     laws = Axis(name=CONTROLLER, targets=(), values=tuple(one.name for one in comparison.controllers))
     for (vehicle, condition), rows in table.groupby([VEHICLE, CONDITION], sort=False):
         for fate, has in FATES.items():

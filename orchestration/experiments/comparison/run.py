@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from fmu_kit.new_files import new_files
 from orchestration.experiments.comparison.bandwidth import Bandwidths, bandwidths
-from orchestration.experiments.comparison.cells import CellSummary, cell_summaries, table_of_runs
+from orchestration.experiments.comparison.cells import CellSummary, cell_summaries, table_of_runs, with_second_axis
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.comparison.outcome import Outcome, outcome_of, write
@@ -166,10 +166,10 @@ def compare(
     comparison = replace(comparison, native=summary.study.native)
     known = bandwidths(comparison)  # after the check of the design, which names an invalid run
     place = summary.path.parent
-    table = frame(summary.path)
+    table = with_second_axis(comparison, frame(summary.path))
     outcome = outcome_of(comparison, table, known)
     with new_files(place) as new:
-        written = [*export(summary.path, new), *write(comparison, outcome, known, new)]
+        written = [*export(summary.path, new, rows=table), *write(comparison, outcome, known, new)]
         if figures:
             from orchestration.experiments.comparison import pictures
             from orchestration.simulation.figures.style import SCREEN  # with it comes matplotlib

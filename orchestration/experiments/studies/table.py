@@ -115,16 +115,23 @@ def _with_units(table: Any, units: Mapping[str, str]) -> Any:
 
 
 def export(
-    path: Path, folder: Path, formats: Collection[str] = ("parquet", "csv"), study: Study | None = None
+    path: Path,
+    folder: Path,
+    formats: Collection[str] = ("parquet", "csv"),
+    study: Study | None = None,
+    *,
+    rows: "pd.DataFrame | None" = None,
 ) -> list[Path]:
     """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
+
+    `rows` are those of the store with columns of the caller, if any.
 
     Of a `study` with cells also the share of good runs of each as `shares`, likewise, and of two laws those of the
     second minus those of the first, as `differences`. Parquet has units in the metadata of its fields, as `unit`; MAT
     has a structure `runs` with a field for each column, and `units` with the same fields. Warns of runs by several
     engines.
     """
-    rows = frame(path)
+    rows = frame(path) if rows is None else rows
     if note := note_in(rows):
         warn(note)
     tables = {"runs": rows}

@@ -266,6 +266,9 @@ def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
     assert done["axes"] == ["period", "loss"]
     cells = {(cell["controller"], *cell["values"].values()): cell for cell in done["cells"]}
     assert len(cells) == 8
+    runs = pd.read_csv(Path("results/two/runs.csv"))
+    assert [*runs][:6] == ["design_index", "vehicle", "condition", "controller", "period", "loss"]
+    assert (runs["condition"] == runs["loss"].map("loss {:g}".format)).all()
     assert all("value" not in cell for cell in cells.values())
     assert {Path(file).name for file in done["files"] if file.endswith("png")} == {
         "limits.png", "map_survive_base_nominal.png", "map_settle_base_nominal.png",
