@@ -13,6 +13,7 @@ from orchestration.foundation.basics.errors import UsageError
 FORMATS = ("csv", "markdown", "latex")
 MAX_ROWS = 40
 """Most rows of a table in LaTeX that stands on one page"""
+_NARROW = r"\footnotesize\setlength{\tabcolsep}{4pt}"
 TABLE = option("--table", "Print the cells with their intervals as a table of that format.", "|".join(FORMATS))
 
 
@@ -48,7 +49,7 @@ def lines(table: PrintedTable, form: str) -> Iterator[str]:
         yield table.caption
     elif len(table.rows) <= MAX_ROWS:
         yield r"\begin{table}  % needs \usepackage{booktabs}"
-        yield r"\centering"
+        yield rf"\centering{_NARROW}"
         yield rf"\caption{{{_latex(table.caption)}}}"
         yield r"\begin{tabular}{" + "l" * len(table.heads) + "}"
         yield from _latex_head(table)
@@ -57,6 +58,7 @@ def lines(table: PrintedTable, form: str) -> Iterator[str]:
         yield r"\end{tabular}"
         yield r"\end{table}"
     else:
+        yield rf"{{{_NARROW}"
         yield r"\begin{longtable}{" + "l" * len(table.heads) + r"}  % needs \usepackage{booktabs,longtable}"
         yield rf"\caption{{{_latex(table.caption)}}} \\"
         yield from _latex_head(table)
@@ -66,7 +68,7 @@ def lines(table: PrintedTable, form: str) -> Iterator[str]:
         yield r"\bottomrule"
         yield r"\endfoot"
         yield from map(_latex_row, table.rows)
-        yield r"\end{longtable}"
+        yield r"\end{longtable}}"
 
 
 def _latex_head(table: PrintedTable) -> Iterator[str]:

@@ -62,6 +62,11 @@ def _texts(table: "pd.DataFrame", column: str) -> list[str]:
     """Values with their intervals, as far as they have one; a dash for a missing cell."""
     texts = []
     for value, low, high in zip(table[column], table["low"], table["high"]):
-        interval = "" if math.isnan(low) else f" [{low:.2f}, {high:.2f}]"
-        texts.append("-" if math.isnan(value) else f"{value:.2f}{interval}")
+        interval = "" if math.isnan(low) else f" [{_signed(low)}, {_signed(high)}]"
+        texts.append("-" if math.isnan(value) else f"{_signed(value)}{interval}")
     return texts
+
+
+def _signed(value: float) -> str:
+    """A number with two decimals, or as many as show that it is not 0."""
+    return f"{value:.2f}" if abs(value) >= 0.005 else f"{value:.1g}" if abs(value) > 1e-9 else "0.00"
