@@ -50,7 +50,7 @@ def basins(by_size: Mapping[str, BySize], axis: Quantity, fate: str, title: str,
     figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s [1]")
     figure.supxlabel(axis.title)
     figure.supylabel("size of the initial error [1]")
-    figure.suptitle(style.lines_of(_joined(title, f"above the white line less than half of the starts {fate}")))
+    style.set_title(figure, _joined(title, f"above the white line less than half of the starts {fate}"))
     return figure
 
 
@@ -186,7 +186,7 @@ def fronts_of(
     count = len({point.value for point in points})
     some = f"{len(values)} of {count} values; " if len(values) < count else ""
     text = _joined(title, f"{some}medians over the starts that all survive; filled: on the front")
-    figure.suptitle(style.lines_of(text))
+    style.set_title(figure, text)
     return figure
 
 

@@ -52,15 +52,23 @@ def cell_lines(
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
         panel.plot(at, group["value"], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
-        if metric == GOOD:
+        if metric != GOOD:
+            known = group[group["good"] > 0]
+            for place, value, count in zip(across.of(known[axis.name]), known["value"], known["good"]):
+                panel.annotate(
+                    f"{count}", (place, value), (0.0, 4.0), textcoords="offset points", ha="center",
+                    fontsize="x-small", color=how["color"],
+                )  # fmt: skip
+        else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
-    panel.set(xlabel=across.title, ylabel=_title(metric, words, units), xscale=SCALES[axis.scale])
+    numbered = "" if metric == GOOD else ", and their number"
+    panel.set(xlabel=across.title, ylabel=_title(metric, words, units) + numbered, xscale=SCALES[axis.scale])
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
     if laws is not None:
         place = "outside right upper" if style.is_wide else "outside lower center"
         figure.legend(loc=place, title=name_of(laws), ncols=1 if style.is_wide else len(groups))
-    figure.suptitle(style.lines_of(_repetitions(found, metric)))
+    style.set_title(figure, _repetitions(found, metric))
     return figure
 
 
@@ -118,7 +126,7 @@ def cell_maps(
         panel.set_ylabel(y.title)
     dots = "; dots: Newcombe's for pairs excludes 0" if metric == GOOD and len(groups) == 2 else ""
     repetitions = _repetitions(found, metric)
-    figure.suptitle(style.lines_of(repetitions and repetitions + dots))
+    style.set_title(figure, repetitions and repetitions + dots)
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):
         handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=f"half of the runs {words[0]}"))

@@ -75,9 +75,10 @@ class Style:
         FigureCanvasAgg(figure)  # one renderer for layout and PNG: each text is measured once
         return figure
 
-    def lines_of(self, text: str) -> str:
-        """A text above all panels, broken into lines that fit the width."""
-        return textwrap.fill(text, max(20, round(self.width / (0.55 * self.font * POINT))))
+    def set_title(self, figure: Figure, text: str) -> None:
+        """Put a text above all panels, broken into lines that fit the width; a paper has none."""
+        if self.has_titles:
+            figure.suptitle(textwrap.fill(text, max(20, round(self.width / (0.55 * self.font * POINT)))))
 
     @contextmanager
     def applied(self) -> Iterator[None]:

@@ -11,6 +11,7 @@ import pytest
 from matplotlib.text import Text
 
 import quadcosim
+from orchestration.command import study_table
 from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, lines
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
@@ -202,6 +203,14 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
     assert panel.get_ylabel() == "share of settled runs [1]"
 
 
+def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
+    figure = cell_lines(runs(), LOSSES, LAWS, "position_rmse", WORDS, units={}, style=STYLES["paper"])
+    assert [text.get_text() for text in figure.axes[0].texts] == ["16", "16", "16", "3", "6"]
+    assert figure.axes[0].get_ylabel().endswith("where settled, and their number")
+    assert not figure.get_suptitle()
+    assert not cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=STYLES["paper"]).get_suptitle()
+
+
 def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -260,6 +269,11 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert "expected at least one finished run" in main("draw", "study.toml", code=2).stderr
 
 
+def test_a_small_end_of_an_interval_keeps_its_sign() -> None:
+    ends = pd.DataFrame({"share": [0.1, -1e-17], "low": [-0.0041, 0.0], "high": [0.256, 0.3]})
+    assert study_table._texts(ends, "share") == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
+
+
 def test_a_printed_table_has_nothing_that_tex_reads_otherwise() -> None:
     table = PrintedTable(
         caption="50 % of law_a", heads=["law_a & b", "share"], rows=[["#1", "-0.4 [-1, 2]"]], numbers=[]
@@ -275,10 +289,11 @@ def test_a_table_of_more_rows_than_a_page_has_is_continued_on_further_pages() ->
     rows = [[str(number), "1.00"] for number in range(MAX_ROWS + 1)]
     table = PrintedTable(caption="Many", heads=["run", "share"], rows=rows, numbers=[])
     text = [*lines(table, "latex")]
-    assert text[0] == r"\begin{longtable}{ll}  % needs \usepackage{booktabs,longtable}"
-    assert text[1] == r"\caption{Many} \\"
+    assert text[0] == r"{\footnotesize\setlength{\tabcolsep}{4pt}", "seven columns fit on a page"
+    assert text[1] == r"\begin{longtable}{ll}  % needs \usepackage{booktabs,longtable}"
+    assert text[2] == r"\caption{Many} \\"
     assert text.count(r"run & share \\") == 2, "a head for the first page and one for the others"
-    assert text[-2:] == [rf"{MAX_ROWS} & 1.00 \\", r"\end{longtable}"]
+    assert text[-2:] == [rf"{MAX_ROWS} & 1.00 \\", r"\end{longtable}}"]
 
 
 def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:
