@@ -1,6 +1,7 @@
 """The poles of a sampled loop over a quantity, and where they cross the unit circle."""
 
 import math
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
@@ -20,10 +21,12 @@ from orchestration.simulation.requests.ranges import Varied, default_quantity, s
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
+from orchestration.theory.stability.operating_point import LONGEST_HYPERPERIOD, hyperperiod_of
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Complexes, poles_of
 from orchestration.theory.stability.sign_changes import zero_between
@@ -36,6 +39,8 @@ COUNT = 40
 SHARE = 0.2
 """Share of the range of a limit by default, farther than which nearly all loops have long left the circle"""
 MAX_COUNT = 10_000
+IRREGULAR = 0.6180339887
+"""Share of the way between two values, commensurate with no other period"""
 DIGITS = 6
 """Digits of its values in a sentence"""
 
@@ -143,6 +148,12 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         system, known = rested(varied.request), KnownTangents()
         found: dict[float, tuple[Complexes, float]] = {}
 
+        def repeats(value: float) -> bool:
+            return hyperperiod_of(changed(system, dict.fromkeys(varied.paths, value))) is not None
+
+        if not all(map(repeats, values)):
+            raise UsageError(_incommensurate(varied, system, values, repeats))
+
         def radius(value: float) -> float:
             try:
                 with whole_at_rest(changed(system, dict.fromkeys(varied.paths, value)), instances, known=known) as loop:
@@ -159,12 +170,16 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 report(1.0 - place / len(values))
                 if len(radii) < 2 or (radii[0] < 1.0) == (radii[1] < 1.0):
                     continue
-                inside, outside = zero_between(
-                    lambda value: radius(value) - 1.0,
-                    lambda value: _short(value, unit),
-                    (values[place], radii[0] - 1.0),
-                    (values[place + 1], radii[1] - 1.0),
-                )
+                low, high = values[place], values[place + 1]
+                if repeats(_short(low + IRREGULAR * (high - low), unit)):
+                    inside, outside = zero_between(
+                        lambda value: radius(value) - 1.0,
+                        lambda value: _short(value, unit),
+                        (low, radii[0] - 1.0),
+                        (high, radii[1] - 1.0),
+                    )
+                else:  # a period beside others, which coincide with few of its values
+                    inside, outside = (low, high) if radii[0] < 1.0 else (high, low)
                 crossings.insert(0, _crossing(inside, *found[outside], leaves=radii[0] < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
@@ -178,6 +193,27 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         poles=poles,
         crossings=tuple(crossings),
     )
+
+
+def _incommensurate(varied: Varied, system: System, values: list[float], repeats: Callable[[float], bool]) -> str:
+    """That some values have no hyperperiod, and a range of which all have one, in fractions of another period."""
+    without = sum(not repeats(value) for value in values)
+    others = [
+        one.sampling.period
+        for name, one in system.components.items()
+        if one.sampling is not None and f"components.{name}.sampling.period" not in varied.paths
+    ]
+    text = f"{varied.of}: for {without} of {len(values)} values the periods have no hyperperiod within twenty of the "
+    text += "longest: expected values commensurate with the other periods"
+    for fraction in range(LONGEST_HYPERPERIOD, 0, -1):
+        step = max(others, default=0.0) / fraction
+        if not step:
+            break
+        first, last = math.ceil(values[0] / step - 1e-9), math.floor(values[-1] / step + 1e-9)
+        count = last - first + 1
+        if 2 <= count <= len(values) and all(repeats(round(k * step, 9)) for k in range(first, last + 1)):
+            return f"{text}, as --from {first * step:g} --to {last * step:g} --count {count}"
+    return text
 
 
 def _short(value: float, unit: str | None) -> float:

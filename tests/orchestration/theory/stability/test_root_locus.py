@@ -1,11 +1,13 @@
 """Poles over a quantity: those of python-control, which leave the unit circle where the delay margin says."""
 
+import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.poles import poles_of
 from quadcosim import UsageError, bode, linearise, locus
@@ -60,3 +62,11 @@ def test_what_is_forgotten_is_no_pole() -> None:
 def test_a_locus_of_one_value_is_refused() -> None:
     with pytest.raises(UsageError, match="count = 1: expected a number from 2"):
         locus(example("dc_servo"), DELAY, first=0.0, last=0.02, count=1)
+
+
+def test_periods_that_never_coincide_are_refused_with_values_that_do() -> None:
+    system = example("dc_servo")
+    slow = dataclasses.replace(system.components["controller"], sampling=Sampling(period=0.012))
+    several = dataclasses.replace(system, components={**system.components, "other": slow})
+    with pytest.raises(UsageError, match=r"for 2 of 5 values .* as first 0\.004 last 0\.012 count 5"):
+        locus(several, "components.controller.sampling.period", first=0.0021, last=0.0123, count=5)
