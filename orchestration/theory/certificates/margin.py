@@ -82,9 +82,10 @@ class Certified:
         broken = f"none found up to {shown(self.largest)} that breaks the loop"
         if self.breaking is not None:
             broken = f"one of {shown(self.breaking)} breaks the loop"
+        best = ""
         if self.small_gain is not None and self.small_gain > (self.certified or 0.0):
-            broken += f"; by the small-gain bound, without a certificate, up to {shown(self.small_gain)} is stable"
-        return f"{self.of}: {proved}, {broken} (small deviations)"
+            best = f"up to {shown(self.small_gain)} is stable by the small-gain bound, without a certificate; "
+        return f"{self.of}: {best}{proved}, {broken} (small deviations)"
 
     def __post_init__(self) -> None:
         """Raise `RuntimeError` for what cannot be: a value that is proved to be stable, and breaks the loop."""
