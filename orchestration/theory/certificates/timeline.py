@@ -36,7 +36,12 @@ class LoopTimeline:
         self._timed = [each for each in varying if each.kind != LOSS]
         for each in varying:
             if each.kind in (JITTER, SHIFT) and loop.depends_on_step(each.name):
-                raise UsageError(f"{each.path}: samples of {each.name} depend on the time to the next one")
+                sent = [f"connections.{x.name}.delay_jitter" for x in loop.system.connections if x.sender == each.name]
+                flown = [f"limit --of {each.path}, which flies it"] if each.kind == JITTER else []
+                raise UsageError(
+                    f"{each.path}: samples of {each.name} depend on the time to the next one, which no proof covers: "
+                    f"expected {' or '.join([*sent, *flown])}"
+                )
         self._lossy = next((each.name for each in varying if each.kind == LOSS), None)
         self._tasks, self._links = sampled_tasks(loop.system), links_of(loop.system)
         self._owner = self._owner_of_draws()
