@@ -97,8 +97,8 @@ int fmi2DoStep(void *c, double t, double h, int no_set) {
     lost = malloc(64);
 #endif
 #ifdef UNWRITTEN
-    volatile double *work = malloc(8 * sizeof *work);
-    m->s.x += 1e-9 * work[7];
+    volatile double *work = malloc(123 * sizeof *work);
+    m->s.x += 1e-9 * work[61];
     free((void *)work);
 #endif
 #ifdef NOISY

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from fmpy.util import auto_interval
 
-from orchestration.components.fmi.access import Access, Interface, Solver
-from orchestration.components.fmi.read_description import Model, called, read_model
+from orchestration.components.fmi.access import SCHEDULED, Access, Interface, Solver
+from orchestration.components.fmi.read_description import Model, called, declared_of, read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
 from orchestration.simulation.engines.resolved import table_of
 from orchestration.systems.signals.table_file import TIME, header_of, read_rows
@@ -61,6 +61,7 @@ def alone(
     if stop_time is None and not model.varies_step and end > step:
         end = step * math.floor(end / step + 1e-9)  # as fmpy: no shorter step at the end
     name = component_names([model])[0]
+    _expect_no_ticks(model, name)
     sources = {} if inputs is None else _sources(model, name, inputs, begin)
     component = Component(
         fmu=str(path),
@@ -159,6 +160,27 @@ def _common(one: Fraction, other: Fraction) -> Fraction:
     """The longest step of which both times are multiples."""
     denominator = math.lcm(one.denominator, other.denominator)
     return Fraction(math.gcd(int(one * denominator), int(other * denominator)), denominator)
+
+
+def _expect_no_ticks(model: Model, name: str) -> None:
+    """Raise `UsageError`, with the system that makes it run, for an FMU with clocks that tick: it needs samples."""
+    if model.interface == SCHEDULED:
+        return
+    ticks = bool(model.ticking)
+    try:
+        model.expect_clocks_that_tick()
+    except UsageError:
+        if "event-mode" not in declared_of(model.description):
+            raise
+        ticks = True
+    if ticks:
+        clock = min(model.clocks, key=lambda each: each.interval or math.inf)
+        period = "" if clock.interval is not None else ", period = SECONDS"
+        raise UsageError(
+            f"{model.path}: has clocks, which tick at samples, of a system only; expected run FILE.toml, with these "
+            f'lines in the file: [components.{name}], fmu = "{model.path.name}", sampling = {{ fmu_clock = '
+            f'"{clock.name}"{period} }}; inputs from a CSV file: [sources.inputs], file, to = ["{name}.INPUT"]'
+        )
 
 
 def _time(model: Model, key: str) -> float | None:

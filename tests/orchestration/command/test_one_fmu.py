@@ -13,7 +13,7 @@ from orchestration.simulation.requests.one_fmu import remarks
 from orchestration.simulation.requests.request import load_request
 from quadcosim import UsageError, run
 from tests.commands import Main
-from tests.orchestration.components.fmi.exchange import exchange
+from tests.orchestration.components.fmi.exchange import exchange, law
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 
 JUMPING = """"time","thrust","torque.x"
@@ -89,6 +89,14 @@ def test_all_commands_set_what_run_sets_and_a_value_that_cannot_be_read_is_named
     assert component.parameters == {"gain": 2.0}
     refused = main("run", fmu, "--in-process", code=1).stderr
     assert "fmi3GetInt8: returned fmi3Error, without a message, for lost" in refused
+
+
+@needs_compiler
+def test_of_an_fmu_whose_clocks_tick_at_samples_the_lines_of_its_system_are_said(main: Main, here: Path) -> None:
+    clock = '<Clock name="fast" valueReference="30" causality="input" intervalVariability="constant" {}/>'
+    refused = main("run", law(here, clock.format('intervalDecimal="0.1"')), code=2).stderr
+    assert "expected run FILE.toml, with these lines in the file: [components.Law], fmu = " in refused
+    assert 'sampling = { fmu_clock = "fast" }; inputs from a CSV file: [sources.inputs]' in refused
 
 
 def numbers(rows: list[str]) -> list[float]:

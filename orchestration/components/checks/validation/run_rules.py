@@ -3,13 +3,13 @@
 import contextlib
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from orchestration.components.checks.validation.excitation import PLAIN, ExcitationPlan
 from orchestration.components.checks.validation.finding import Note
 from orchestration.components.checks.validation.fmu import is_clocked
-from orchestration.components.checks.validation.instance import Row, Value
+from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value
 from orchestration.components.checks.validation.probe import MIN_STEPS, Probe
 from orchestration.components.checks.validation.run_comparison import same
 from orchestration.components.fmi.instance import start_value
@@ -17,6 +17,8 @@ from orchestration.components.fmi.read_description import Variable, declared_of
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.foundation.basics.errors import SimulatorError
 
+_FEW = 20
+"""Steps after which the first changes of what is fixed are looked for"""
 _DIGITS = 5e-15
 """relative error of a number in a text of 15 digits"""
 
@@ -63,20 +65,35 @@ def start_values(probe: Probe) -> Iterator[str]:
         moments = {"freshly instantiated": instance.row(declared)} if is_readable else {}
         instance.start({}, probe.start)
         moments["after initialisation"] = instance.row(declared)
-        kept = [v for v in probe.elements if v.variability in ("constant", "fixed") or v.causality == "parameter"]
-        before, points = instance.row(kept), probe.points(PLAIN)
-        steps = sum(1 for _ in itertools.takewhile(lambda point: instance.advance(*point), points))
-        after = instance.row(kept)
+        changed = list(_changed(probe, instance, probe.points(PLAIN)[:_FEW]))
     for v in declared:
         for moment, row in moments.items():
             if not _starts(row[v.name], start_value(v), exactly=probe.fmu.is_ours):
                 yield f"{v.name}: start = {v.start}, but {moment} it is {row[v.name]!r}"
                 break
+    yield from changed
+
+
+def _late_changes(probe: Probe) -> Iterator[str]:
+    """What is fixed, and parameters, are not changed by the steps after those few of `start_values`, either."""
+    points = probe.points(PLAIN)
+    with probe.instance() as instance:
+        probe.begin(instance, PLAIN)
+        if not [*_changed(probe, instance, points[:_FEW])] and not instance.stopped:
+            yield from _changed(probe, instance, points[_FEW:])
+
+
+def _changed(probe: Probe, instance: CheckedInstance, points: Sequence[tuple[float, float]]) -> Iterator[str]:
+    """The changes of what is fixed, and of parameters, by steps."""
+    kept = [v for v in probe.elements if v.variability in ("constant", "fixed") or v.causality == "parameter"]
+    before = instance.row(kept)
+    steps = sum(1 for _ in itertools.takewhile(lambda point: instance.advance(*point), points))
+    after = instance.row(kept)
     for v in kept:
         if not same(before[v.name], after[v.name]):
             yield (
-                f"{v.name}: {before[v.name]!r} after initialisation, but {after[v.name]!r} after {steps} steps: "
-                f"expected a {v.variability} {v.causality} to stay what it is unless it is set"
+                f"{v.name}: {before[v.name]!r}, but {after[v.name]!r} after {steps} steps more: expected a "
+                f"{v.variability} {v.causality} to stay what it is unless it is set"
             )
 
 
@@ -137,7 +154,8 @@ def variable_steps(probe: Probe) -> Iterator[str]:
 def repeatable(probe: Probe) -> Iterator[str]:
     """Two fresh instances give the same run; otherwise, as with `rand()`, rules that compare runs are not tried.
 
-    So they do where fresh memory has other contents. That memory grows from step to step is a note.
+    So they do where fresh memory has other contents. That memory grows from step to step is a note. Late
+    steps change nothing that is fixed.
     """
     if probe.repeats is not None:
         text = f"{probe.repeats}, as in an equal run before; rules that compare runs are not tried"
@@ -146,6 +164,7 @@ def repeatable(probe: Probe) -> Iterator[str]:
         yield f"{probe.reads_unwritten}, if fresh memory has other contents: it reads what nobody has written"
     if probe.growth:
         yield Note(f"its memory grows by {probe.growth} bytes in each step: a long run may exhaust it")
+    yield from _late_changes(probe)
 
 
 def inputs_set_twice(probe: Probe) -> Iterator[str]:
