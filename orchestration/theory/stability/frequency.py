@@ -37,7 +37,7 @@ from orchestration.theory.stability.linearise import (
     stability_of,
 )
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
-from orchestration.theory.stability.loop_halves import closed, loop_gains, open_gains, radius, sensitivities
+from orchestration.theory.stability.loop_halves import closed, loop_gains, radius, sensitivities
 from orchestration.theory.stability.operating_point import deterministic
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.sign_changes import root, sign_changes
@@ -222,9 +222,8 @@ def _bode(request: Request, component: str | None) -> Bode:
                 gains = loop_gains(loop, frequencies)
                 each = (_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop))
             else:
-                back = open_gains(loop, frequencies)
                 added = sensitivities(loop, frequencies)
-                curves = [lifted_gains(loop, i, frequencies, back, added) for i in _commands(loop)]
+                curves = [lifted_gains(loop, i, frequencies, added) for i in _commands(loop)]
                 gains = np.array([curve for curve, _ in curves])
                 each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
             found = list[LoopMargins]()

@@ -22,23 +22,19 @@ TURNS = np.linspace(0.0, math.pi, 361)[1:]
 HALVINGS = 50
 
 
-def lifted_gains(
-    loop: Linearised, i: int, frequencies: Floats, back: Complexes, added: Complexes
-) -> tuple[Complexes, float]:
+def lifted_gains(loop: Linearised, i: int, frequencies: Floats, added: Complexes) -> tuple[Complexes, float]:
     """The gain of the loop of a command at each frequency, shape (n,), and the largest gain of its sensitivity.
 
-    That is by the norm of a signal over all samples. `back` are the `open_gains` at the frequencies, `added` the
-    `sensitivities`, in which poles of 1, as of a position, do not cancel.
+    That is by the norm of a signal over all samples. Both follow from `added`, the `sensitivities` at the frequencies:
+    beside whole turns in a period rounding would decide on what the halves have, by poles of 1, as of a position.
     """
     own = places(loop, i)
-    others = np.setdiff1d(np.arange(back.shape[1]), own)
-    through = np.linalg.solve(np.eye(len(others)) + back[:, others][:, :, others], back[:, others][:, :, own])
-    of_command = back[:, own][:, :, own] - back[:, own][:, :, others] @ through
-    values, vectors = np.linalg.eig(of_command)
+    sensitivity = added[:, own][:, :, own]
+    values, vectors = np.linalg.eig(sensitivity)
     harmonic = np.exp(-1j * np.outer(frequencies * loop.dt, np.arange(loop.samples)))
     chosen = np.abs(np.einsum("nj,njk->nk", harmonic, vectors)).argmax(axis=1)
-    peak = np.linalg.norm(added[:, own][:, :, own], 2, axis=(1, 2)).max()
-    return np.take_along_axis(values, chosen[:, None], axis=1)[:, 0], float(peak)
+    gains: Complexes = 1.0 / np.take_along_axis(values, chosen[:, None], axis=1)[:, 0] - 1.0
+    return gains, float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
 
 
 def places(loop: Linearised, i: int) -> Integers:

@@ -55,16 +55,6 @@ def response(of: StateSpace, z: Complexes) -> Complexes:
     return np.asarray(of.C @ states + of.D, dtype=complex)
 
 
-def open_gains(loop: Linearised, frequencies: Floats) -> Complexes:
-    """The gain of all commands to each, shape (n, commands, commands), the measurements of all samples eliminated."""
-    z, rest, law = np.exp(1j * frequencies * loop.rest.dt), loop.rest, loop.component
-    states = replace(rest, C=np.eye(len(rest.A)), D=np.zeros((len(rest.A), rest.B.shape[1])))
-    of_rest = response(states, z)
-    measured = law.B @ rest.C @ of_rest + law.B @ rest.D
-    of_law = np.linalg.solve(z[:, None, None] * np.eye(len(law.A)) - law.A, measured)
-    return np.asarray(-(law.C @ of_law + law.D @ rest.C @ of_rest + law.D @ rest.D))
-
-
 def sensitivities(loop: Linearised, frequencies: Floats) -> Complexes:
     """All commands by what is added to each, with the loop closed, shape (n, commands, commands)."""
     z, whole = np.exp(1j * frequencies * loop.rest.dt), closed(loop)

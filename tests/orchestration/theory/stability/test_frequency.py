@@ -17,7 +17,8 @@ from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
 from orchestration.theory.stability.delay_margin import Late, jumps_of
 from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
-from orchestration.theory.stability.loop_halves import closed, loop_gains, open_gains, sensitivities
+from orchestration.theory.stability.lifted_margins import lifted_gains
+from orchestration.theory.stability.loop_halves import closed, loop_gains, sensitivities
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import example
@@ -198,6 +199,43 @@ def test_a_loop_of_one_command_has_the_others_closed() -> None:
     assert 1.0 / (1.0 + loop_gains(loop, np.array([7.0]))[:, 0]) == pytest.approx(sensitivity, rel=1e-9)
 
 
+def test_beside_whole_turns_in_a_period_of_five_samples_gains_and_sensitivity_are_those_of_one() -> None:
+    """Four integrators with feedback of their state, all samples with the same gains: rounding has no say there."""
+    samples, dt = 5, 0.004
+    A = np.array(
+        [[1.0, dt, dt**2 / 2, dt**3 / 6], [0.0, 1.0, dt, dt**2 / 2], [0.0, 0.0, 1.0, dt], [0.0, 0.0, 0.0, 1.0]]
+    )
+    B = np.array([[dt**4 / 24], [dt**3 / 6], [dt**2 / 2], [dt]])
+    gains = np.array([[960.0, 1280.0, 560.0, 50.0]])  # of poles of -2, -4, -4 and -40 1/s, about
+    powers = [np.linalg.matrix_power(A, k) for k in range(samples + 1)]
+    direct = np.zeros((4 * samples, samples))
+    for later, sooner in zip(*np.tril_indices(samples, -1)):
+        direct[4 * later : 4 * later + 4, [sooner]] = powers[later - sooner - 1] @ B
+    of_rest = StateSpace(
+        A=powers[samples], B=np.hstack([power @ B for power in powers[samples - 1 :: -1]]),
+        C=np.vstack(powers[:samples]), D=direct, dt=samples * dt, inputs=("",) * samples,
+        outputs=("",) * 4 * samples,
+    )  # fmt: skip
+    law = StateSpace(
+        A=np.zeros((0, 0)), B=np.zeros((0, 4 * samples)), C=np.zeros((samples, 0)),
+        D=np.kron(np.eye(samples), -gains), dt=samples * dt, inputs=of_rest.outputs, outputs=of_rest.inputs,
+    )  # fmt: skip
+    loop = Linearised(
+        name="law", component=law, rest=of_rest, operating_point={}, radius=0.5, poles=(), samples=samples
+    )
+
+    def gain(at: np.ndarray) -> np.ndarray:
+        z = np.exp(1j * at * dt)[:, None, None]
+        return np.asarray(gains @ np.linalg.solve(z * np.eye(4) - A, B[None]))[:, 0, 0]
+
+    turn = 2.0 * np.pi / (samples * dt)
+    beside = turn * np.array([1.0 - 1e-4, 1.0 + 1e-4, 1.0 + 1e-3, 2.0 + 1e-4])
+    found, peak = lifted_gains(loop, 0, beside, sensitivities(loop, beside))
+    assert found == pytest.approx(gain(beside), rel=1e-9)
+    everywhere = np.add.outer(beside, turn * np.arange(samples)).ravel()
+    assert peak == pytest.approx(np.abs(1.0 / (1.0 + gain(everywhere))).max(), rel=1e-9)
+
+
 def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
     late = changed(system_of("dc_servo"), {DELAY: 0.02})
     found = bode(late)
@@ -221,8 +259,6 @@ def test_a_loop_that_rounding_decides_is_refused_and_so_are_halves_that_are_not_
     with pytest.raises(UsageError, match="cannot be cut open there"):
         expect_decided(dataclasses.replace(loop, component=law))
     assert np.abs(np.linalg.eigvals(closed(loop).A)).max() == pytest.approx(loop.radius, rel=1e-9)
-    at = np.array([1.0, 50.0, 300.0])
-    assert sensitivities(loop, at) == pytest.approx(np.linalg.inv(1.0 + open_gains(loop, at)), rel=1e-6)
 
 
 def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
