@@ -61,7 +61,7 @@ def expect(fmu: Path, folder: Path) -> None:
         return
     what = f"building it runs the code in {folder.resolve()}, which is not of this project"
     if not (_policy.allowed or _policy.ask(f"{fmu} is missing or out of date; {what}. Build it?")):
-        raise UsageError(f"fmu = {fmu}: is missing or out of date; {what}: expected --build, once for this folder")
+        raise UsageError(f"{fmu}: is missing or out of date; {what}: expected --build, once for this folder")
     agree(folder)
 
 

@@ -82,7 +82,8 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
             packing, target = _variant_at(path, announce)
         if target is not None and (is_out_of_date(path, target, packing) or is_of_elsewhere(path, target)):
             if target.root is not None:
-                consent.expect(path, path.parents[len(Path(packing.folder).parts)])
+                with prefixed("fmu = "):
+                    consent.expect(path, path.parents[len(Path(packing.folder).parts)])
             _announce_build(path, announce)
             build_slaves([target], path.parent, announce, packing=packing)
         if path.is_file():

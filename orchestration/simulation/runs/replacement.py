@@ -61,7 +61,7 @@ def component_named(system: System, component: str | None, to: str) -> str:
     sampled = [name for name, each in system.components.items() if each.sampling is not None]
     if component is None:
         if len(sampled) != 1:
-            listed = ", ".join(system.components)
+            listed = ", ".join(sampled or system.components)
             raise UsageError(f"component: expected the one {to}, as {len(sampled)} are sampled; one of {listed}")
         component = sampled[0]
     if component not in system.components:

@@ -10,7 +10,7 @@ import json
 from dataclasses import asdict, dataclass, replace
 
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.theory.stability.lifted_component import of_one_rate
+from orchestration.theory.stability.lifted_component import of_one_rate, several_rates
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
@@ -52,9 +52,12 @@ class ComponentIdentifier:
 
     def of(self, loop: AtRest) -> dict[str, IdentifiedComponent]:
         """The components of a loop."""
-        found = {}
-        for name in loop.simulation.instances:
-            key = _cache_key(loop, name)
+        found, components = {}, loop.simulation.system.components
+        keys = {name: _cache_key(loop, name) for name in loop.simulation.instances}
+        for name, key in keys.items():
+            if key not in self._known and components[name].sampling is not None and (count := loop.samples(name)) > 1:
+                raise several_rates(name, count)  # before any is identified, which takes long
+        for name, key in keys.items():
             if key not in self._known:
                 self._known[key] = _identified(loop, name)
             found[name] = self._known[key]

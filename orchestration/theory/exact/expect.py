@@ -36,7 +36,10 @@ class Expected:
     """Likewise of fourth moments; from 1 on no Monte-Carlo interval of a mean square means anything. None: too many to
     compute."""
     accuracy: float
-    """Accuracy of the results, relative: the change by the last refinement, and the accuracy of the components."""
+    """Accuracy of the results, relative: the change by the last refinement, and the accuracy of the components.
+
+    Errors of those that round coarsely, as in single precision, add up over the hyperperiods that the loop remembers.
+    """
     method: str
     """Method by which the components were identified, and by which the result was computed."""
     period: float
@@ -95,10 +98,12 @@ def expected_of(system: System, loops: Loops, horizon: float | None = None) -> E
         reasons = {**linear.objectives.reasons, **dict.fromkeys(linear.objectives.calls, why)}
     else:
         values, reasons = _finite_values(linear.objectives, means), linear.objectives.reasons
+    remembered = 1.0 / (1.0 - loop.radius) if loop.radius < 1.0 else 1.0
+    of_components = max(linear.accuracy, linear.precision * remembered)
     return Expected(
         objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
         mean_square_radius=loop.radius, fourth_moment_radius=loop.fourth_moment_radius,
-        accuracy=converged.difference + linear.accuracy, period=solution.loop.period,
+        accuracy=converged.difference + of_components, period=solution.loop.period,
         method=_method(linear.methods, converged.order, system, simulated=loops.simulated, horizon=horizon),
         horizon=horizon,
     )  # fmt: skip

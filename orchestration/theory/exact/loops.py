@@ -54,6 +54,8 @@ class Linear:
     """Methods by which each is identified"""
     accuracy: float
     """Accuracy of the responses of the least accurately identified one, relative"""
+    precision: float
+    """Likewise of those that round coarsely, as in single precision; 0: there are none"""
     objectives: ObjectiveMeans
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
@@ -130,6 +132,7 @@ class Loops:
                 initial_state = initial_state_of(initial, loop, parts, tangents, self._instances)
         methods = {name: one.method for name, one in known.items()}
         accuracy = max((one.accuracy for one in known.values()), default=0.0)
+        precision = max((one.tangent.precision for one in known.values()), default=0.0)
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
@@ -137,7 +140,8 @@ class Loops:
                     "component that integrates more accurately"
                 )
         return Linear(
-            parts=parts, methods=methods, accuracy=accuracy, objectives=objectives, noise=noise, initial=initial_state
+            parts=parts, methods=methods, accuracy=accuracy, precision=precision, objectives=objectives, noise=noise,
+            initial=initial_state,
         )  # fmt: skip
 
     def radius(self, system: System, *, agree: float) -> float:

@@ -78,9 +78,14 @@ def of_one_rate(tangent: "Tangent | LiftedTangent") -> Tangent:
     """The tangent of a component whose samples are alike; raises `UsageError` for one of several rates."""
     if isinstance(tangent, Tangent):
         return tangent
-    raise UsageError(
-        f"{tangent.name}: responds alike only at every {_nth(tangent.samples)} sample, as code of several rates does: "
-        "expected one rate, or limit, linearise, bode, step or locus, which take several"
+    raise several_rates(tangent.name, tangent.samples)
+
+
+def several_rates(name: str, samples: int) -> UsageError:
+    """That a component responds alike only every some samples, where one rate is needed."""
+    return UsageError(
+        f"{name}: responds alike only at every {_nth(samples)} sample, as code of several rates does: expected an FMU, "
+        "and a component, for each rate, or limit, linearise, bode, step or locus, which take several"
     )
 
 

@@ -33,8 +33,8 @@ def lifted_gains(loop: Linearised, i: int, frequencies: Floats, added: Complexes
     values, vectors = np.linalg.eig(sensitivity)
     harmonic = np.exp(-1j * np.outer(frequencies * loop.dt, np.arange(loop.samples)))
     chosen = np.abs(np.einsum("nj,njk->nk", harmonic, vectors)).argmax(axis=1)
-    gains: Complexes = 1.0 / np.take_along_axis(values, chosen[:, None], axis=1)[:, 0] - 1.0
-    return gains, float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
+    of_chosen = np.take_along_axis(values, chosen[:, None], axis=1)[:, 0]
+    return np.asarray(1.0 / of_chosen - 1.0, dtype=complex), float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
 
 
 def places(loop: Linearised, i: int) -> Integers:

@@ -25,7 +25,7 @@ from orchestration.systems.system.request import Request, errors_in_own_terms, s
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.lifted_component import lifted_names
 from orchestration.theory.stability.linear_simulator import OpenPort
-from orchestration.theory.stability.loop_at_rest import AtRest, whole_at_rest
+from orchestration.theory.stability.loop_at_rest import AtRest, expect_whole_instances, whole_at_rest
 from orchestration.theory.stability.matrices import of_lifted
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Pole, as_poles, poles_of
@@ -115,6 +115,7 @@ def _linearised(request: Request, component: str | None) -> Linearised:
 
 def sampled_component(system: System, component: str | None) -> str:
     """The component at which a loop is cut open; raises `UsageError` for one that is not sampled."""
+    expect_whole_instances(system)
     name = component_named(system, component, "at which to cut the loop open")
     if system.components[name].sampling is None:
         raise UsageError(f"component: {name}: expected a sampled component")

@@ -247,14 +247,20 @@ def _cycles(system: System, samples: Mapping[str, int]) -> Iterator[Fraction]:
 # -- coming to rest -------------------------------------------------------------------------------------------------
 
 
-def _expect_period(system: System) -> Fraction:
-    expect_fixed_periods(system)
+def expect_whole_instances(system: System) -> None:
+    """Raise `UsageError` for a component that is a partition."""
     for name, component in system.components.items():
         if component.partition is not None:
             raise UsageError(
                 f"{name} is a partition, whose state is that of the whole instance: expected the code as one component "
                 "without partition, whose tasks run when they are due"
             )
+
+
+def _expect_period(system: System) -> Fraction:
+    expect_fixed_periods(system)
+    expect_whole_instances(system)
+    for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has its own clock")
     period = hyperperiod_of(system)

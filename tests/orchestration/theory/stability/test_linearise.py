@@ -112,7 +112,7 @@ def test_what_no_input_moves_and_no_output_shows_is_left_out() -> None:
     [
         ("double_integrator", "plant", r"^component: plant: expected a sampled component$"),
         ("double_integrator", "contoller", r"^component: contoller: did you mean controller\?"),
-        ("four_components", None, r"^component: expected the one at which to cut the loop open, as 3 are"),
+        ("four_components", None, r"as 3 are sampled; one of sensor, controller, engine$"),
     ],
 )  # fmt: skip
 def test_a_component_at_which_no_loop_can_be_cut_open_is_refused(
