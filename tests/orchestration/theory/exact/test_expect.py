@@ -39,13 +39,20 @@ def test_minimum_variance_control_costs_what_theory_says_through_its_fmus() -> N
     assert not found.reasons
 
 
-def test_of_one_system_after_the_other_only_components_that_change_are_measured_again() -> None:
+def test_of_one_system_after_the_other_only_components_that_change_are_measured_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     one, other = (example("distributed_servo", {"components.controller.parameters.K": K}) for K in (1.5, 1.0))
     loops = Loops(files_of(one).models)
     first, second = loops.linear(one).parts, loops.linear(other).parts
     assert second["servo"] is first["servo"]
     assert pytest.approx(first["controller"].D / 1.5, rel=1e-9) == second["controller"].D
     assert expected_of(other, loops).objectives == pytest.approx(expect(other).objectives, rel=1e-12)
+    single = dataclasses.replace(loops.linear(other), precision=1e-6)
+    monkeypatch.setattr(loops, "linear", lambda system: single)
+    found = expected_of(other, loops)  # errors of each period add up
+    assert found.accuracy == pytest.approx(1e-6 / (1.0 - found.mean_square_radius), rel=0.01)
+    assert found.accuracy > 1.5e-6
 
 
 def test_with_a_uniform_delay_through_its_fmus_too() -> None:
