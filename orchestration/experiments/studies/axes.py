@@ -55,7 +55,8 @@ class Axis:
             object.__setattr__(self, "targets", (self.name,))
         if self.values is not None and not self.values:
             raise UsageError(f"axis {self.name}: expected at least one value")
-        if CONTROLLER & {*self.targets} and any(is_table(v) or not isinstance(v, str) for v in self.values or ()):
+        of_scenario = CONTROLLER - {"components.controller.fmu"}
+        if of_scenario & {*self.targets} and any(is_table(v) or not isinstance(v, str) for v in self.values or ()):
             raise UsageError(f"axis {self.name}: expected controllers by name or path; {OF_ONE_LAW}")
         if len({_kind(value) for value in self.values or ()}) > 1:
             raise UsageError(f"axis {self.name}: expected values of one kind: numbers, texts, or true and false")

@@ -92,7 +92,7 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
 ) -> None:
     plant = f"[base.plant]\nfmu = '{sick_plant(tmp_path).name}'\n"
     axis = f'[[axes]]\nname = "mass"\nsets = ["plant.mass"]\nvalues = [{WAITS}]\n'
-    (tmp_path / "study.toml").write_text(f"[base]\nstop_time = 0.2\n{plant}{axis}")
+    (tmp_path / "study.toml").write_text(f"[base]\nstop_time = 0.2\nmodel_mismatch = true\n{plant}{axis}")
     monkeypatch.setenv(WAIT, "until it is killed")
     with start("sweep", "study.toml", "--engine", "compiled", cwd=tmp_path) as coordinator:
         while coordinator.poll() is None:
