@@ -337,9 +337,8 @@ def test_a_plant_state_that_overflows_is_divergence(start: Values, inputs: Value
             plant.step(0.01 * k, 0.01)
 
     error = refusal(fly)
-    assert str(error).startswith(f"it ({PLANT}): fmi2DoStep: ")
-    assert "expected" in str(error)
-    assert "finite value" in str(error)
+    assert str(error).startswith("it.position.x = ")
+    assert str(error).endswith(": expected a finite value")
     assert "\n" not in str(error)
     assert error.divergence
 

@@ -102,6 +102,7 @@ def test_failed_runs_are_reported_immediately_and_fail_the_command(folder: Path,
     assert "12 runs, 12 of them new, 6 failed (quadcosim export shows why; --retry-failed)" in done.stdout
     told = done.stderr.splitlines()
     assert told.pop() == "follows the trajectory that UnifiedController has built in"
+    assert told.pop(0).startswith("warning: the controller's nominal model is not the plant: ")
     assert len(told) == 3
     assert told[0].startswith("run 1 (period = 0.02, delay = 0.0, plant.mass = 0.0) failed: plant.mass = 0.0: ")
     assert told[2].endswith("; further ones are not shown")

@@ -72,10 +72,10 @@ def test_a_limit_states_the_last_good_value_the_first_bad_one_and_its_resolution
 
 
 def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() -> None:
-    half = SimpleNamespace(A=[0.0], dt=0.01)
+    half, common = SimpleNamespace(A=[0.0], dt=0.01), {"precision": 0.0, "clock": "sampled every 10 ms"}
 
     def sentence(radius: float) -> str:
-        loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius, clock="sampled every 10 ms")
+        loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius, **common)
         return str(cast("Any", Linearised.verdict).fget(loop))
 
     assert sentence(0.9).startswith("stable: spectral radius 0.9, sampled every 10 ms: law with 1 state,")

@@ -349,9 +349,10 @@ def test_a_simulator_that_reports_divergence_ends_the_run_with_its_time(side: st
     error = SimulatorError("state not finite", divergence=True)
     run = StubRun(Timing(), 0.1, Straying(time=0.012, error=error) if side == "plant" else None, failing(side, error))
     assert run.over is True
-    assert run.master.divergence == "state not finite"
-    assert run.master.divergence_time == (12 if side == "plant" else 10) * MS
-    assert len(run.nanoseconds()) == (12 if side == "plant" else 10)
+    at = 12 if side == "plant" else 10
+    assert run.master.divergence == f"state not finite, at t = {at / 1000:g} s"
+    assert run.master.divergence_time == at * MS
+    assert len(run.nanoseconds()) == at
 
 
 def failing(side: str, error: SimulatorError) -> Counting:
