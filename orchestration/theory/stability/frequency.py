@@ -24,7 +24,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.delay_margin import Crossover, Late, crossover_at, delay_margin, jumps_of
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
+from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin, radius_with
 from orchestration.theory.stability.linearise import (
     NEAR_ONE,
     Linearised,
@@ -343,13 +343,6 @@ def _ends_stability(loop: Linearised, i: int, factor: float) -> bool:
 
 def _away_from_one(factor: float) -> float:
     return abs(math.log(factor))
-
-
-def radius_with(loop: Linearised, i: int, factor: float) -> float:
-    """The spectral radius of both halves with a factor on one command."""
-    factors = np.ones(len(loop.component.outputs))
-    factors[i] = factor
-    return radius(loop, factors)
 
 
 def _is_finite_at(loop: Linearised, frequency: float) -> bool:

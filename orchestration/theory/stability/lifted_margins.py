@@ -6,7 +6,6 @@ each belongs to the frequency that its eigenvector has most of, up to half the s
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -14,12 +13,12 @@ from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.theory.stability.linearise import NEAR_ONE, Linearised
 from orchestration.theory.stability.loop_halves import closed, radius
 from orchestration.theory.stability.poles import Complexes
+from orchestration.theory.stability.sign_changes import root
 
 FACTORS = np.geomspace(1.0, 1e4, 401)[1:]
 """Factors on a command that are tried, and their inverses"""
 TURNS = np.linspace(0.0, math.pi, 361)[1:]
 """Turns of the phase of a command that are tried [rad]"""
-HALVINGS = 50
 
 
 def lifted_gains(loop: Linearised, i: int, frequencies: Floats, added: Complexes) -> tuple[Complexes, float]:
@@ -53,7 +52,7 @@ def gain_margins(loop: Linearised, i: int) -> list[tuple[float, float]]:
         before = 1.0
         for factor in map(float, factors):
             if radius_with(loop, i, factor) > 1.0 + NEAR_ONE:
-                at = _halved(lambda value: radius_with(loop, i, value) > 1.0, before, factor)
+                at = root(lambda value: radius_with(loop, i, value) - 1.0, before, factor)
                 found.append((at, abs(_frequency_of(loop, i, at))))
                 break
             before = factor
@@ -67,7 +66,7 @@ def phase_margin(loop: Linearised, i: int) -> tuple[float, float] | None:
     """
     for turn in TURNS:
         if radius_with(loop, i, np.exp(-1j * turn)) > 1.0 + NEAR_ONE:
-            at = _halved(lambda value: radius_with(loop, i, np.exp(-1j * value)) > 1.0, turn - TURNS[0], turn)
+            at = root(lambda value: radius_with(loop, i, np.exp(-1j * value)) - 1.0, turn - TURNS[0], turn)
             frequency = _frequency_of(loop, i, np.exp(-1j * at))
             return math.copysign(at, frequency), abs(frequency)
     return None
@@ -94,10 +93,3 @@ def _frequency_of(loop: Linearised, i: int, factor: complex) -> float:
     at = (np.angle(poles[least]) + 2.0 * math.pi * turns) / loop.rest.dt
     content = np.abs(np.exp(-1j * np.outer(at, np.arange(loop.samples)) * loop.dt) @ command)
     return float(at[content.argmax()])
-
-
-def _halved(fails: Callable[[float], bool], good: float, bad: float) -> float:
-    for _ in range(HALVINGS):
-        middle = 0.5 * (good + bad)
-        good, bad = (good, middle) if fails(middle) else (middle, bad)
-    return 0.5 * (good + bad)
