@@ -1,13 +1,14 @@
 """Summaries of the cells of a comparison: survival, settling, error and effort, with confidence intervals."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from orchestration.experiments.comparison.design import CONDITION, START, Case, Comparison
-from orchestration.experiments.comparison.survival import RESIDUAL, SETTLING, diverged_late, settled, survived
+from orchestration.experiments.comparison.design import CONDITION, START, VEHICLE, Case, Comparison
+from orchestration.experiments.comparison.survival import FATES, RESIDUAL, SETTLING, diverged_late, settled, survived
 from orchestration.experiments.studies.axes import Value
+from orchestration.experiments.studies.shares import GOOD, PAIR, RANDOM
 from orchestration.foundation.basics.statistics import quantile, wilson
 
 if TYPE_CHECKING:
@@ -161,6 +162,20 @@ def with_second_axis(comparison: Comparison, table: "pd.DataFrame") -> "pd.DataF
     values = table[CONDITION].map({name: one.value for name, one in comparison.on_second.items()})
     table.insert(table.columns.get_loc(comparison.axis.name) + 1, comparison.second.name, values)
     return table
+
+
+def tables_of_maps(
+    comparison: Comparison, table: "pd.DataFrame"
+) -> "Iterator[tuple[tuple[str, str], str, pd.DataFrame]]":
+    """The finished runs over both axes: a vehicle and a condition of the file, a fate, and which runs have it.
+
+    `table` is one `with_second_axis`; those here are such as `cells_of` reads, with pairs of equal initial conditions.
+    """
+    stands_for = {name: one.condition for name, one in comparison.on_second.items()}
+    done = table[table["status"] == "done"]
+    for of, rows in done.groupby([VEHICLE, done[CONDITION].map(stands_for)], sort=False):
+        for fate, has in FATES.items():  # random, since initial conditions are drawn
+            yield of, fate, rows.assign(**{GOOD: has(rows), RANDOM: True, PAIR: rows[START]})
 
 
 def sizes(comparison: Comparison, table: "pd.DataFrame") -> "pd.Series":

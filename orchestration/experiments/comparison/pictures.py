@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.experiments.comparison.cells import sizes
-from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
+from orchestration.experiments.comparison.cells import sizes, tables_of_maps
+from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
 from orchestration.experiments.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
-from orchestration.experiments.comparison.survival import FATES
+from orchestration.experiments.comparison.survival import FATES, WORDS
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps
 from orchestration.experiments.studies.figures import made, save
-from orchestration.experiments.studies.shares import GOOD, PAIR, RANDOM
+from orchestration.experiments.studies.shares import GOOD
 from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.style import SCREEN, Style
@@ -65,7 +65,7 @@ def _pictures(
 ) -> Iterator[Picture]:
     axis, done = quantity_of(comparison.axis, units), table[table["status"] == "done"]
     if comparison.second is not None:
-        yield from _maps(comparison, comparison.second, done, units)
+        yield from _maps(comparison, comparison.second, table, units)
     else:
         for (vehicle, condition), rows in done.groupby([VEHICLE, CONDITION], sort=False):
             yield from _of_one(comparison, units, outcome, rows, (vehicle, condition))
@@ -99,21 +99,12 @@ def _of_one(
         yield f"front_{end}", partial(fronts_of, points, shown, axis, names, colors, title)
 
 
-def _maps(comparison: Comparison, second: Axis, done: "pd.DataFrame", units: Mapping[str, str]) -> Iterator[Picture]:
+def _maps(comparison: Comparison, second: Axis, table: "pd.DataFrame", units: Mapping[str, str]) -> Iterator[Picture]:
     """The share that survives, and that settles, over both axes, for each vehicle under each condition of the file."""
-    stands_for = {name: one.condition for name, one in comparison.on_second.items()}
-    table = done.assign(**{CONDITION: done[CONDITION].map(stands_for)})
     laws = Axis(name=CONTROLLER, targets=(), values=tuple(one.name for one in comparison.controllers))
-    for (vehicle, condition), rows in table.groupby([VEHICLE, CONDITION], sort=False):
-        for fate, has in FATES.items():
-            repeated = rows.assign(
-                **{GOOD: has(rows), RANDOM: True, PAIR: rows[START]}
-            )  # as initial conditions are drawn
-            draw = partial(_map, repeated, (comparison.axis, second), laws, _WORDS[fate], units)
-            yield f"map_{fate}_{_file_name((vehicle, condition))}", draw
-
-
-_WORDS = {"survive": ("surviving", "diverged"), "settle": ("settled", "not settled")}
+    for of, fate, rows in tables_of_maps(comparison, table):
+        draw = partial(_map, rows, (comparison.axis, second), laws, WORDS[fate], units)
+        yield f"map_{fate}_{_file_name(of)}", draw
 
 
 def _map(

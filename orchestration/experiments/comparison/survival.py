@@ -36,3 +36,5 @@ def diverged_late(table: "pd.DataFrame", horizon: float) -> "pd.Series":
 
 FATES: Mapping[str, "Fate"] = {"survive": survived, "settle": settled}
 """Fates by the name in tables and files"""
+WORDS = {"survive": ("surviving", "diverged"), "settle": ("settled", "not settled")}
+"""The names of a run that has a fate, and of one that has not"""

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
-from orchestration.experiments.report.model import OtherStudy, RepeatedMaps, Report, ReportRun, ReportShare, Setting
-from orchestration.experiments.report.repeated import maps_of_both, repeated_maps
+from orchestration.experiments.report.model import OtherStudy, Report, ReportRun, ReportShare, Setting
+from orchestration.experiments.report.repeated import maps_of_both, repeated_maps, runs_in_cells
 from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
 from orchestration.experiments.report.tracks import Tracks
+from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.store import note_on_engines, open_for_reading
@@ -98,10 +99,12 @@ def study_report(
     by_chance = is_sample(stored, study)
     overall = _overall(stored, study)
     words = words_of(stored, study)
-    repeated = _repeated(study, stored, axes)
-    if other is not None:
+    runs = runs_in_cells(study, stored.rows, axes)
+    if other is None:
+        repeated = repeated_maps(runs)
+    else:
         over = _over(*other, axes=axes, of=name, blobs=blobs)
-        repeated = maps_of_both((name, repeated), (other[0], _repeated(other[2], other[1], axes)))
+        repeated = maps_of_both((name, runs), (other[0], runs_in_cells(other[2], other[1].rows, axes)))
     return Report(
         kind="study",
         title=name,
@@ -130,10 +133,6 @@ def study_report(
         provenance=tuple(provenance_of(stored.about)),
         command=command,
     )  # fmt: skip
-
-
-def _repeated(study: Study | None, stored: Stored, axes: Sequence[ColumnAxis]) -> RepeatedMaps | None:
-    return None if study is None else repeated_maps(study, stored.rows, axes)
 
 
 def _over(
@@ -172,10 +171,12 @@ def axes_of(stored: Stored, study: Study | None) -> list[ColumnAxis]:
             ColumnAxis(name=name, quantity=quantity(labels.words(name), stored.units.get(name), _values(stored, name)))
             for name in json.loads(stored.about["axes"])
         ]
-    return [
-        ColumnAxis(name=axis.name, quantity=quantity_of(axis, stored.units), logarithmic=axis.scale == "logarithmic")
-        for axis in study.axes
-    ]
+    return [column_axis(axis, stored.units) for axis in study.axes]
+
+
+def column_axis(axis: Axis, units: Mapping[str, str]) -> ColumnAxis:
+    """An axis of a study as the page draws it, with the units of the store."""
+    return ColumnAxis(name=axis.name, quantity=quantity_of(axis, units), logarithmic=axis.scale == "logarithmic")
 
 
 def _values(stored: Stored, axis: str) -> list[Any]:

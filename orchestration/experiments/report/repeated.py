@@ -1,19 +1,13 @@
-"""The maps of a study that repeats: shares of its cells with their intervals, and the difference of two laws."""
+"""The maps of runs that repeat in cells: shares with their intervals, and differences of two laws or two studies."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.report.model import CellMap, MapCell, RepeatedMaps
 from orchestration.experiments.report.tables import ColumnAxis, Row
-from orchestration.experiments.studies.shares import (
-    cells_of,
-    differences_of,
-    interval_of_difference,
-    laws_of,
-    with_chance,
-)
+from orchestration.experiments.studies.shares import TwoLaws, cells_of, differences_of, laws_of, with_chance
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.requirements import is_number
@@ -21,92 +15,134 @@ from orchestration.systems.system.requirements import is_number
 if TYPE_CHECKING:
     import pandas as pd
 
+STUDY, FIRST, SECOND = "study it is of", "first", "second"
+"""Column of the runs of two studies, and its values"""
 
-def repeated_maps(study: Study, rows: Sequence[Row], axes: Sequence[ColumnAxis]) -> RepeatedMaps | None:
-    """The maps over two axes of numbers, or over one and one of names; None of other studies.
 
-    An axis of names beside two of numbers has a map for each, and for two names one of their difference, the last.
+@dataclass(frozen=True, kw_only=True)
+class RunsInCells:
+    """Runs over two axes, and an axis of names that has a map for each, if there is one."""
+
+    table: "pd.DataFrame"
+    """the finished ones, as `with_chance` makes it"""
+    across: ColumnAxis
+    up: ColumnAxis
+    law: str | None
+    word: str
+    """the name of the outcome of a good run"""
+    repeat: str
+    """the axis that repeats"""
+
+    @property
+    def by(self) -> list[str]:
+        """The axes of the cells."""
+        return [self.across.name, self.up.name, *([] if self.law is None else [self.law])]
+
+
+def runs_in_cells(study: Study | None, rows: Sequence[Row], axes: Sequence[ColumnAxis]) -> RunsInCells | None:
+    """The runs of a study that repeats over two axes of numbers, or over one and one of names; None of other studies.
+
+    An axis of names beside two of numbers is that of the laws.
     """
     import pandas as pd
 
-    known = {axis.name: axis for axis in axes}
-    names = study.cell_names
-    if names is None or study.origin.criterion.good is None or any(axis.values is None for axis in study.axes):
+    names = None if study is None else study.cell_names
+    if study is None or names is None or study.repeat is None or study.origin.criterion.good is None:
         return None
+    if any(axis.values is None for axis in study.axes):
+        return None
+    known = {axis.name: axis for axis in axes}
     numeric = [axis.name for axis in study.cell_axes if all(map(is_number, axis.values or ()))]
     named = [name for name in names if name not in numeric]
     if (len(numeric), len(named)) not in ((2, 0), (2, 1), (1, 1)):
         return None
-    across, up = known[numeric[0]], known[(numeric + named)[1]]
     columns = ("status", "good", "design_index")
     table = pd.DataFrame([{**row["settings"], **{name: row[name] for name in columns}} for row in rows])
-    table = with_chance(table[table["status"] == "done"], study)
-    word, law = study.origin.criterion.outcomes[0], named[0] if len(numeric) == 2 and named else None
-    found = cells_of(table, names)
-    groups = [("", found)] if law is None else [(str(name), found[found[law] == name]) for name in table[law].unique()]
-    maps = [
-        CellMap(
-            title=f"share {word}" + (f", {_short(name)}" if name else ""),
-            is_difference=False,
-            cells=tuple(_cells(group, across, up, table, [*names], word)),
-        )
-        for name, group in groups
-    ]
-    if law is not None and (laws := laws_of(table, names)) is not None:
-        others = [name for name in names if name != law]
-        title = f"difference, {_short(laws.second)} minus {_short(laws.first)}"
-        cells = _cells(differences_of(table, names, laws), across, up, table, others, None)
-        maps.append(CellMap(title=title, is_difference=True, cells=tuple(cells)))
-    return RepeatedMaps(across=across.name, up=up.name, maps=tuple(maps))
+    return RunsInCells(
+        table=with_chance(table[table["status"] == "done"], study),
+        across=known[numeric[0]],
+        up=known[(numeric + named)[1]],
+        law=named[0] if len(numeric) == 2 and named else None,
+        word=study.origin.criterion.outcomes[0],
+        repeat=study.repeat,
+    )
 
 
-def maps_of_both(
-    first: tuple[str, RepeatedMaps | None], second: tuple[str, RepeatedMaps | None]
-) -> RepeatedMaps | None:
-    """The maps of two studies over the same axes, by their names; of a map each also their difference, the last.
+def repeated_maps(runs: RunsInCells | None) -> RepeatedMaps | None:
+    """A map of each law, and of two laws one of their difference, the last."""
+    if runs is None:
+        return None
+    laws = None if runs.law is None else laws_of(runs.table, runs.by)
+    differences = [] if laws is None else [difference_map(runs, laws)]
+    return RepeatedMaps(
+        across=runs.across.name, up=runs.up.name, maps=(*share_maps(runs, f"share {runs.word}"), *differences)
+    )
+
+
+def maps_of_both(first: tuple[str, RunsInCells | None], second: tuple[str, RunsInCells | None]) -> RepeatedMaps | None:
+    """The maps of two studies over the same axes, by their names, and last those of their difference, one of each law.
 
     Cells of the second open no runs. None if neither repeats; raises `UsageError` if only one does, or over other axes.
     """
+    import pandas as pd
+
     (name, one), (name_of_other, other) = first, second
     if one is None and other is None:
         return None
-    if one is None or other is None or (one.across, one.up) != (other.across, other.up):
+    if one is None or other is None or (one.by, one.repeat) != (other.by, other.repeat):
         raise UsageError(f"{name_of_other}: expected the same design.repeat and order of axes as {name}, to draw both")
-    others = [replace(each, cells=tuple(replace(cell, runs=()) for cell in each.cells)) for each in other.maps]
-    named = [(name, each) for each in one.maps] + [(name_of_other, each) for each in others]
-    maps = [replace(each, title=f"{of}: {each.title}") for of, each in named]
-    if len(one.maps) == len(others) == 1:
-        title = f"difference, {name_of_other} minus {name}"
-        maps.append(CellMap(title=title, is_difference=True, cells=tuple(_minus(others[0], one.maps[0]))))
-    return replace(one, maps=tuple(maps))
+    both = pd.concat([one.table.assign(**{STUDY: FIRST}), other.table.assign(**{STUDY: SECOND})], ignore_index=True)
+    differences = differences_of(both, [STUDY, *one.by], TwoLaws(STUDY, FIRST, SECOND))
+    maps = [
+        *share_maps(one, f"{name}: share {one.word}"),
+        *share_maps(other, f"{name_of_other}: share {other.word}", opens=False),
+        *_maps(one, differences, f"difference, {name_of_other} minus {name}", one.table, is_difference=True),
+    ]
+    return RepeatedMaps(across=one.across.name, up=one.up.name, maps=tuple(maps))
 
 
-def _minus(one: CellMap, other: CellMap) -> Iterator[MapCell]:
-    """The cells of a map minus those of another, whose runs they have."""
-    known = {(cell.x, cell.y): cell for cell in one.cells}
-    for cell in other.cells:
-        if (above := known.get((cell.x, cell.y))) is not None:
-            low, high = interval_of_difference(*map(_as_share, (above, cell)))
-            yield _cell((cell.x, cell.y), (above.value - cell.value, low, high), cell.runs, None)
+def share_maps(runs: RunsInCells, title: str, *, opens: bool = True) -> list[CellMap]:
+    """The shares of good runs in the cells, a map for each law; whether cells open their runs."""
+    return _maps(runs, cells_of(runs.table, runs.by), title, runs.table if opens else runs.table[:0])
 
 
-def _as_share(cell: MapCell) -> dict[str, float]:
-    low, high = (math.nan if end is None else end for end in (cell.low, cell.high))
-    return {"share": cell.value, "low": low, "high": high}
+def difference_map(runs: RunsInCells, laws: TwoLaws, title: str = "difference") -> CellMap:
+    """The share of the second law minus that of the first."""
+    table = runs.table[runs.table[laws.axis].isin(laws[1:])]
+    title = f"{title}, {_short(laws.second)} minus {_short(laws.first)}"
+    cells = _cells(runs, differences_of(table, runs.by, laws), table, is_difference=True)
+    return CellMap(title=title, is_difference=True, cells=tuple(cells))
 
 
-def _cells(
-    found: "pd.DataFrame", across: ColumnAxis, up: ColumnAxis, table: "pd.DataFrame", by: list[str], word: str | None
-) -> list[MapCell]:
-    """Cells of shares that are `word`, or of differences; their runs have the same values of the axes `by`."""
-    runs = table.groupby(by)["design_index"].agg(list).to_dict()
+def _maps(
+    runs: RunsInCells, found: "pd.DataFrame", title: str, table: "pd.DataFrame", *, is_difference: bool = False
+) -> list[CellMap]:
+    """A map for each law of some cells, which open the runs in a table."""
+    groups = [("", found, table)]
+    if runs.law is not None:
+        laws = runs.table[runs.law].unique()
+        groups = [(f", {_short(str(law))}", *(each[each[runs.law] == law] for each in (found, table))) for law in laws]
+    return [
+        CellMap(
+            title=title + end,
+            is_difference=is_difference,
+            cells=tuple(_cells(runs, cells, opened, is_difference=is_difference)),
+        )
+        for end, cells, opened in groups
+    ]
+
+
+def _cells(runs: RunsInCells, found: "pd.DataFrame", table: "pd.DataFrame", *, is_difference: bool) -> list[MapCell]:
+    """Cells of shares, or of differences, of one law or two; a cell opens the runs in a table with its two values."""
+    by = [runs.across.name, runs.up.name]
+    opened = table.groupby(by)["design_index"].agg(list).to_dict()
     cells = []
     for row in found.to_dict("records"):
         key = tuple(row[name] for name in by)
-        value, low, high = (row[name] for name in ("difference" if word is None else "share", "low", "high"))
-        place = (float(across.quantity.of(row[across.name])), _value(up, row[up.name]))
-        counts = None if word is None else (row["good"], row["count"], word)
-        cells.append(_cell(place, (value, low, high), tuple(map(int, runs[key])), counts))
+        place = (float(runs.across.quantity.of(key[0])), _value(runs.up, key[1]))
+        value, low, high = (row[name] for name in ("difference" if is_difference else "share", "low", "high"))
+        counts = None if is_difference else (row["good"], row["count"], runs.word)
+        cells.append(_cell(place, (value, low, high), tuple(map(int, opened.get(key, ()))), counts))
     return cells
 
 

@@ -135,12 +135,18 @@ def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "
 
 
 def _correlations(table: "pd.DataFrame", others: list[str], laws: TwoLaws) -> dict[tuple[Any, ...], float]:
-    """The correlation of the pairs of runs of both laws, by the values of the other axes."""
+    """The correlation of the shares of both laws, by the values of the other axes.
+
+    It is that of the pairs, less where some runs have no partner, as theirs are independent.
+    """
     done = table[table["status"] == "done"]
-    one, other = (done.loc[done[laws.axis] == law, [*others, PAIR, "good"]] for law in (laws.second, laws.first))
+    counted = done.assign(count=done.groupby([laws.axis, *others])["good"].transform("size"))
+    columns = [*others, PAIR, "good", "count"]
+    one, other = (counted.loc[done[laws.axis] == law, columns] for law in (laws.second, laws.first))
     found = {}
     for key, rows in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others):
         good, its = rows["good"].astype(bool), rows["good.other"].astype(bool)
         counts = (int(each.sum()) for each in (good & its, good & ~its, ~good & its, ~good & ~its))
-        found[key] = pair_correlation(*counts)
+        paired = len(rows) / math.sqrt(rows["count"].iloc[0] * rows["count.other"].iloc[0])
+        found[key] = pair_correlation(*counts) * paired
     return found

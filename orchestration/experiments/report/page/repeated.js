@@ -19,7 +19,7 @@ function startRepeated() {
     }));
   }
   const dots = maps.at(-1).is_difference ? " Dots: the 95 % interval of the difference (Newcombe) excludes 0." : "";
-  byId("map-hint").textContent = `Each cell is all runs that differ in what repeats alone.${dots} Hover for its interval; click, or move with the arrow keys, to see its runs below.`;
+  byId("map-hint").textContent = `Each cell is all runs that differ in ${report.kind === "comparison" ? "their start" : "what repeats"} alone.${dots} Hover for its interval; click, or move with the arrow keys, to see its runs below.`;
   redraws.push(drawRepeated, drawRunsOfCell);
   return drawRepeated();
 }
@@ -37,7 +37,7 @@ function firstRepeated() {
 
 function drawRepeated() {
   const { across, up, maps } = report.repeated;
-  const { title, is_difference: isDifference, cells: here } = maps[repeated.map];
+  const { is_difference: isDifference, cells: here } = maps[repeated.map];
   const [x, y] = [columnsByName.get(across), columnsByName.get(up)];
   const different = (values) => (typeof values[0] === "string" ? [...new Set(values)] : [...new Set(values)].sort((a, b) => a - b));
   const [columns, rows] = [different(here.map((cell) => cell.x)), different(here.map((cell) => cell.y))];
@@ -49,7 +49,7 @@ function drawRepeated() {
     type: "heatmap", x: columns, y: rows, z: table((cell) => cell.value), zmin: isDifference ? -1 : 0, zmax: 1, xgap: 1,
     colorscale: isDifference ? "Differences" : "Cividis", text: table((cell) => (room && !marked.includes(cell) ? cell.text : "")),
     customdata: table((cell) => here.indexOf(cell)), said: (i, j) => hoverOfRepeated(at(i, j)),
-    colorbar: { tickformat: ".0%", title: { text: escaped(title) }, ...(isNarrowMap() ? { orientation: "h" } : {}) },
+    colorbar: { tickformat: ".0%", title: { text: isDifference ? "difference of the shares" : "share" }, ...(isNarrowMap() ? { orientation: "h" } : {}) },
   };
   const dots = { type: "scatter", mode: "markers", x: marked.map((cell) => cell.x), y: marked.map((cell) => cell.y), showlegend: false, marker: { symbol: "circle", size: 7, color: "#000", line: { width: 1, color: "#fff" } } };
   const layout = {
@@ -100,7 +100,7 @@ function openRepeated(cell) {
   const hint = cell.runs.length ? "Each point is a run; click one, or use the arrow keys, to open it." : "This file does not have its runs.";
   byId("cell-text").textContent = `${cell.said}. ${hint}`;
   map.rows = cell.runs.map(rowOfIndex).filter((row) => row !== undefined);
-  map.x = axes.find((axis) => ![report.repeated.across, report.repeated.up].includes(axis.name) && !axis.words) ?? axes.at(-1);
+  map.x = axes.findLast((axis) => ![report.repeated.across, report.repeated.up].includes(axis.name) && !axis.words) ?? axes.at(-1);
   map.y = VALUE;
   measureSlider();
   byId("cell-controls").replaceChildren(choice("Metric", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => { map.metric = columnsByName.get(name); drawRunsOfCell(); }));
@@ -120,7 +120,7 @@ function rowOfIndex(index) {
 function startTableOfRepeated() {
   byId("shares").hidden = false;
   byId("shares-title").textContent = "The cells as a table";
-  byId("shares-text").textContent = "Shares with Wilson intervals at 95 %, differences with those of Newcombe, of laws for pairs of runs with the same seed, of studies for independent runs; none where nothing is random.";
+  byId("shares-text").textContent = "Shares with Wilson intervals at 95 %, differences with those of Newcombe for pairs of runs with the same seed or start; none where nothing is random.";
   byId("shares-plot").hidden = true;
   const rows = report.repeated.maps.flatMap(({ title, cells: here }) => here.map((cell) => [`${title}: ${placeOfRepeated(cell)}`, cell.said]));
   byId("shares-table").replaceChildren(tableOf(rows, ["cell", "share and interval"]));

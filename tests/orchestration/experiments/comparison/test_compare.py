@@ -10,7 +10,10 @@ import pytest
 import quadcosim
 from orchestration.components.fmi.reuse import Instances
 from orchestration.experiments.comparison.cells import CellSummary, Median, Share
+from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.comparison.run import agree
+from orchestration.experiments.report.of_comparison import comparison_report
+from orchestration.experiments.report.subset import Wanted
 from orchestration.quadrotor.flight.bandwidth import crossover
 from orchestration.quadrotor.flight.hover import COORDINATES, hover_of
 from orchestration.quadrotor.flight.hover_loop import controller_at_hover, located
@@ -273,6 +276,17 @@ def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
     assert {Path(file).name for file in done["files"] if file.endswith("png")} == {
         "limits.png", "map_survive_base_nominal.png", "map_settle_base_nominal.png",
     }  # fmt: skip
+    loaded = load_comparison("two.toml")
+    maps = comparison_report(loaded, Path("results/two/study.sqlite"), "", Wanted(most=0)).repeated
+    assert maps is not None
+    assert (maps.across, maps.up) == ("period", "loss")
+    assert [one.title for one in maps.maps[:3]] == [
+        "share surviving, coupled", "share surviving, uncoupled",
+        "difference of the shares surviving, uncoupled minus coupled",
+    ]  # fmt: skip
+    for one in maps.maps[0].cells:
+        share = cells["coupled", one.x / 1e3, one.y]
+        assert (one.value, one.low, one.high) == tuple(share[f"survives.{end}"] for end in ("share", "low", "high"))
     Path("one.toml").write_text(TWO_AXES.replace("values = [0.0, 0.3]", "values = [0.3]").replace('"two"', '"one"'))
     again = json.loads(main("compare", "one.toml", "--native", "--no-figures", "--json").stdout)
     for cell in again["cells"]:  # the same runs as of a comparison without the other loss

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from orchestration.experiments.report.model import CellMap, MapCell, RepeatedMaps
-from orchestration.experiments.report.repeated import maps_of_both, repeated_maps
+from orchestration.experiments.report.model import CellMap, MapCell
+from orchestration.experiments.report.repeated import RunsInCells, maps_of_both, repeated_maps, runs_in_cells
 from orchestration.experiments.report.tables import ColumnAxis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.shares import interval_of_difference
@@ -21,27 +21,24 @@ PERIODS, LOSSES, SEEDS = axis("timing.period", 0.01, 0.02), axis("timing.loss", 
 
 def maps_of(chosen: Study) -> tuple[CellMap, ...] | None:
     """The maps where the second law is good at 10 ms without loss alone, and the first everywhere."""
-    found = maps_with(
-        chosen,
-        lambda at: (
-            at.get("controller") != "CascadedController" or (at["timing.period"], at["timing.loss"]) == (0.01, 0.0)
-        ),
+    found = repeated_maps(
+        runs_with(
+            chosen,
+            lambda at: (
+                at.get("controller") != "CascadedController" or (at["timing.period"], at["timing.loss"]) == (0.01, 0.0)
+            ),
+        )
     )
     return None if found is None else found.maps
 
 
-def maps_where(chosen: Study, bad: tuple[float, float] | None) -> RepeatedMaps | None:
-    """The maps where one period with a loss is bad."""
-    return maps_with(chosen, lambda at: (at["timing.period"], at["timing.loss"]) != bad)
-
-
-def maps_with(chosen: Study, is_good: Callable[[dict[str, Any]], bool]) -> RepeatedMaps | None:
+def runs_with(chosen: Study, is_good: Callable[[dict[str, Any]], bool]) -> RunsInCells | None:
     rows: list[dict[str, Any]] = [
         {"design_index": i, "settings": point, "status": "done", "good": int(is_good(point))}
         for i, point in enumerate(chosen.points)
     ]
     axes = [ColumnAxis(name=each.name, quantity=quantity_of(each, {"timing.period": "s"})) for each in chosen.axes]
-    return repeated_maps(chosen, rows, axes)
+    return runs_in_cells(chosen, rows, axes)
 
 
 def cell(of: CellMap, x: float, y: float) -> MapCell:
@@ -67,23 +64,41 @@ def test_two_laws_have_a_map_each_and_one_of_their_difference() -> None:
     assert apart.runs == (9, 10, 11, 21, 22, 23)
 
 
-def test_two_studies_have_their_own_maps_and_the_difference_of_both() -> None:
+def test_two_studies_have_their_own_maps_and_the_difference_of_both_in_pairs_of_one_seed() -> None:
     chosen = study(PERIODS, LOSSES, SEEDS, repeat="seed")
-    both = [maps_where(chosen, bad) for bad in (None, (0.02, 0.1))]
-    found = maps_of_both(("a", both[0]), ("b", both[1]))
+    one = runs_with(chosen, lambda at: at["seed"] != 3)
+    other = runs_with(chosen, lambda at: (at["timing.period"], at["timing.loss"]) != (0.02, 0.1) and at["seed"] != 3)
+    found = maps_of_both(("a", one), ("b", other))
     assert found is not None
     first, second, difference = found.maps
     assert [one.title for one in found.maps] == ["a: share settled", "b: share settled", "difference, b minus a"]
     assert cell(second, 20.0, 0.1).text == "0/3"
     assert (cell(first, 20.0, 0.1).runs, cell(second, 20.0, 0.1).runs) == ((9, 10, 11), ())
-    apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(3, 3))
-    shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 1.0), ends)]
+    apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(2, 3))
+    shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 2 / 3), ends)]
     assert (apart.low, apart.high) == interval_of_difference(*shares)
-    assert (apart.value, apart.runs) == (-1.0, (9, 10, 11))
+    assert (apart.value, apart.runs) == (-2 / 3, (9, 10, 11))
+    alike, share = cell(difference, 10.0, 0.1), {"share": 2 / 3, "low": ends[1][0], "high": ends[1][1]}
+    assert (alike.low, alike.high) == interval_of_difference(share, share, correlation=(2 - 1.5) / 2)
     assert cell(difference, 10.0, 0.0).said == "0 %, nothing is random"
     with pytest.raises(UsageError, match=r"b: expected the same design\.repeat and order of axes as a"):
-        maps_of_both(("a", both[0]), ("b", None))
+        maps_of_both(("a", one), ("b", None))
     assert maps_of_both(("a", None), ("b", None)) is None
+
+
+def test_two_studies_of_two_laws_have_a_difference_of_each_and_unpaired_seeds_count_less() -> None:
+    first, second = (
+        study(LAWS, PERIODS, LOSSES, axis("seed", *seeds), repeat="seed") for seeds in ((1, 2, 3, 4), (2, 3, 4, 5))
+    )
+    both = [(name, runs_with(each, lambda at: at["seed"] != 2)) for name, each in (("a", first), ("b", second))]
+    found = maps_of_both(both[0], both[1])
+    assert found is not None
+    assert [one.title for one in found.maps[-2:]] == [
+        "difference, b minus a, UnifiedController", "difference, b minus a, CascadedController",
+    ]  # fmt: skip
+    apart, (low, high) = cell(found.maps[-1], 20.0, 0.1), wilson(3, 4)
+    share, of_pairs = {"share": 0.75, "low": low, "high": high}, (2 - 1.5) / 2
+    assert (apart.low, apart.high) == interval_of_difference(share, share, correlation=of_pairs * 3 / 4)
 
 
 def test_other_studies_keep_the_map_of_their_runs() -> None:
