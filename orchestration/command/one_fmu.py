@@ -68,7 +68,7 @@ class OneFmuFlags:
 
     def applied_to(self, path: Path, flags: FlightFlags) -> "System":
         """The FMU at `path` alone, with these flags and those of any system; `--set` has the names of the FMU."""
-        from orchestration.simulation.requests.one_fmu import alone, held_line, late_jump, remarks
+        from orchestration.simulation.requests.one_fmu import alone, late_jump, remarks
 
         solver = _chosen("solver", self.solver, SOLVERS)
         interface = _chosen("interface", self.interface, _ALONE) or ("model-exchange" if solver else None)
@@ -79,7 +79,7 @@ class OneFmuFlags:
         )  # fmt: skip
         for remark in remarks(system, is_default_end=flags.stop_time is None):
             inform(remark)
-        for late in filter(None, (late_jump(system), held_line(system))):
+        if late := late_jump(system):
             warn(f"{self.inputs}: {late}")
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
 

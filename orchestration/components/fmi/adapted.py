@@ -47,6 +47,7 @@ _FUNCTIONS: Mapping[Interface, Mapping[str, str]] = {
 """Fields of the adapter, and the functions of the FMU in them"""
 _IN_FMI2 = {"UpdateDiscreteStates": "NewDiscreteStates", "GetContinuousStateDerivatives": "GetDerivatives"}
 _TYPES_OF_FMI2 = {"Float64": "Real", "Int32": "Integer", "Boolean2": "Boolean"}
+_IN_ADAPTER = {name: place for place, name in _TYPES_OF_FMI2.items()}
 
 _PROBLEMS = {
     "ENDLESS_UPDATES": "asks for another update of its discrete states 1000 times at {0:g} s; expected an end",
@@ -75,6 +76,7 @@ def library() -> Any:
     size = ctypes.c_size_t
     loaded.keep_values.argtypes = (pointer, ctypes.c_int, ctypes.c_char_p, size, ctypes.c_char_p, size)
     loaded.size_of.restype = size
+    loaded.set_followed.argtypes = (pointer, number)
     return loaded
 
 
@@ -120,7 +122,7 @@ class AdaptedInstance(StepsWithEnd):
         if self.model.access.solver == "cvode":
             from orchestration.components.fmi.cvode import Cvode  # not before: loads its libraries
 
-            self._cvode = Cvode(self._fmu, a, self.version)
+            self._cvode = Cvode(self._fmu, a, self.version, library().set_followed)
             a.solver = ctypes.cast(self._cvode.function, ctypes.c_void_p).value
         if self.model.ticking:
             self._make_clocks_tick()
@@ -167,6 +169,26 @@ class AdaptedInstance(StepsWithEnd):
             a.ratio[i], a.shift[i] = int(ratio), int(after)
         a.starts_late = int(late)
         self._intervals = (period, offset)
+
+    def follow(self, inputs: Sequence[str], times: Floats, values: Floats) -> None:
+        """As `Instance`."""
+        a, types, numbers = self._adapter, _types(), _constants()
+        parts = self._layout.parts(inputs, np.zeros(len(inputs)), shared=self._arrays)
+        references = [np.array(part.references, dtype=np.uint32) for part in parts]
+        times, values = np.rint(times * NANOSECONDS) / NANOSECONDS, np.ascontiguousarray(values)  # as instants
+        rows = [
+            types["Followed"](
+                type=numbers[_IN_ADAPTER.get(part.type, part.type)], references_count=len(of), count=len(part.buffer),
+                inputs=len(part.places), references=address(of), values=address(part.buffer),
+                places=address(part.places), columns=address(part.array_places),
+            )
+            for part, of in zip(parts, references)
+        ]  # fmt: skip
+        table = (types["Followed"] * len(rows))(*rows)
+        self._followed = parts, references, times, values, table
+        a.start, a.rows_time, a.rows = self.start_time, address(times), address(values)
+        a.rows_count, a.columns_count = values.shape
+        a.followed, a.followed_count = ctypes.addressof(table), len(table)
 
     def _sizes(self) -> tuple[int, int]:
         """The numbers of its continuous states and event indicators."""
@@ -221,7 +243,7 @@ class AdaptedInstance(StepsWithEnd):
         """As `NativeInstance`."""
         super().reset()
         self._continue(now=0.0, next=math.inf, h=0.0, events=0, ends=0, samples=0)
-        self._adapter.running = self._adapter.in_event = 0
+        self._adapter.running = self._adapter.in_event = self._adapter.followed_count = self._adapter.rows_count = 0
         for starts, values in self._clocked:
             values[:] = starts
 

@@ -39,6 +39,12 @@ typedef struct { /* values that are set when the next sample begins */
     void *references, *values;
 } Waiting;
 
+typedef struct { /* inputs that are set by one call, and follow lines: each at its place, by its column of the table */
+    int64_t type, references_count, count, inputs;
+    void *references, *values;
+    const int64_t *places, *columns;
+} Followed;
+
 typedef struct {
     void *fmu; /* the instance */
     int64_t version;
@@ -69,6 +75,13 @@ typedef struct {
     int64_t clocked_count;
     Waiting *waiting;
     int64_t waiting_count, waiting_room;
+    /* lines that inputs follow within a step of model exchange, through rows of a table */
+    double start; /* [s] the time of the FMU at 0 of the table */
+    double from;  /* [s] there a jump has happened, as where a step begins */
+    const double *rows_time, *rows;
+    int64_t rows_count, columns_count;
+    Followed *followed;
+    int64_t followed_count;
 } Adapter;
 
 typedef struct {
@@ -77,7 +90,7 @@ typedef struct {
 } Size;
 
 #define SIZE_OF(structure) {#structure, sizeof(structure)}
-EXPORT const Size sizes[] = {SIZE_OF(Adapter), SIZE_OF(Clocked), SIZE_OF(Waiting), SIZE_OF(Size), {0}};
+EXPORT const Size sizes[] = {SIZE_OF(Adapter), SIZE_OF(Clocked), SIZE_OF(Waiting), SIZE_OF(Followed), SIZE_OF(Size), {0}};
 
 typedef int Call(void *);
 typedef int SetNumber(void *, double);
@@ -102,6 +115,54 @@ static int fail(Adapter *a, int problem) {
 /* Whether two times are the same nanosecond, and whether one is no later than the other. */
 static bool same(double a, double b) { return rint(a * 1e9) == rint(b * 1e9); }
 static bool is_due(double a, double b) { return rint(a * 1e9) <= rint(b * 1e9); }
+
+static const size_t bytes[] = {8, 4, 1, 1, 2, 2, 4, 4, 8, 8, sizeof(bool), sizeof(int)};
+
+static int call(Adapter *a, void *function, const uint32_t *references, size_t n, void *values, size_t count) {
+    if (a->version == 3) return ((Access3 *)function)(a->fmu, references, n, values, count);
+    return ((Access2 *)function)(a->fmu, references, n, values);
+}
+
+/* -- inputs along lines -------------------------------------------------------------------------------------------- */
+
+/* The number of rows before a time of the FMU, or also of that time. */
+static int64_t rows_before(const Adapter *a, double time, bool also) {
+    int64_t low = 0, high = a->rows_count;
+    while (low < high) {
+        int64_t middle = (low + high) / 2;
+        if (also ? a->rows_time[middle] <= time : a->rows_time[middle] < time) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
+/* Set the inputs that follow lines to their values at t, those of the sources in Python to the bit. */
+static int follow(Adapter *a, double t) {
+    if (!a->followed_count) return OK;
+    double time = t - a->start, instant = rint(time * 1e9) / 1e9;
+    if (fabs(time - instant) < 1e-15 * (1 + fabs(t))) time = instant;
+    int64_t i = rows_before(a, time, t <= a->from) - 1, last = a->rows_count - 2;
+    i = i < 0 ? 0 : i > last ? last : i;
+    double share = (time - a->rows_time[i]) / (a->rows_time[i + 1] - a->rows_time[i]);
+    share = fmin(fmax(share, 0), 1);
+    const double *row = a->rows + i * a->columns_count, *next = row + a->columns_count;
+    int status = OK;
+    for (Followed *f = a->followed; status <= WARNING && f < a->followed + a->followed_count; f++) {
+        for (int64_t j = 0; j < f->inputs; j++) {
+            int64_t c = f->columns[j];
+            double value = share == 1 && i < last ? next[c] : row[c] + share * (next[c] - row[c]);
+            if (f->type == Float32) ((float *)f->values)[f->places[j]] = (float)value;
+            else ((double *)f->values)[f->places[j]] = value;
+        }
+        status = call(a, a->set[f->type], f->references, (size_t)f->references_count, f->values, (size_t)f->count);
+    }
+    return status;
+}
+
+static int set_time(Adapter *a, double t) {
+    int status = ((SetNumber *)a->set_time)(a->fmu, t);
+    return status > WARNING ? status : follow(a, t);
+}
 
 /* -- events -------------------------------------------------------------------------------------------------------- */
 
@@ -176,7 +237,7 @@ static int handle_time_events(Adapter *a, int64_t most) {
         int status = OK;
         if (a->next > a->now) {
             a->now = a->next;
-            if (a->set_time) status = ((SetNumber *)a->set_time)(a->fmu, a->now);
+            if (a->set_time) status = set_time(a, a->now);
         }
         if (status > WARNING || (status = handle_event(a)) > WARNING) return status;
     }
@@ -184,13 +245,6 @@ static int handle_time_events(Adapter *a, int64_t most) {
 }
 
 /* -- values ------------------------------------------------------------------------------------------------------- */
-
-static const size_t bytes[] = {8, 4, 1, 1, 2, 2, 4, 4, 8, 8, sizeof(bool), sizeof(int)};
-
-static int call(Adapter *a, void *function, const uint32_t *references, size_t n, void *values, size_t count) {
-    if (a->version == 3) return ((Access3 *)function)(a->fmu, references, n, values, count);
-    return ((Access2 *)function)(a->fmu, references, n, values);
-}
 
 static Clocked *clocked_of(Adapter *a, int type, uint32_t reference) {
     for (Clocked *c = a->clocked; c < a->clocked + a->clocked_count; c++)
@@ -297,7 +351,7 @@ static int run_partition(Adapter *a, double t) {
 
 /* Put the FMU at a time with these states. */
 static int put(Adapter *a, double t, const double *x) {
-    int status = ((SetNumber *)a->set_time)(a->fmu, t);
+    int status = set_time(a, t);
     if (status > WARNING || !a->states) return status;
     return ((SetNumbers *)a->set_states)(a->fmu, x, (size_t)a->states);
 }
@@ -467,6 +521,15 @@ static int cosimulate(Adapter *a, double until, int *idle) {
     return event ? handle_event(a) : status;
 }
 
+/* Let the inputs that jump at the row reached do so, as an event that is not noted. */
+static int pass_jump(Adapter *a, int64_t row) {
+    if (row + 1 >= a->rows_count || a->rows_time[row] != a->rows_time[row + 1]) return OK;
+    a->from = a->now;
+    int status = enter_event(a);
+    if (status > WARNING || (status = follow(a, a->now)) > WARNING) return status;
+    return conclude(a);
+}
+
 /* Step from t by h, with the arguments of fmi3DoStep. */
 EXPORT int
 step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool *early, double *reached) {
@@ -477,6 +540,7 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
     *event = *early = *ends = false, *reached = end;
     if (!same(a->now, t)) a->now = t, a->fresh = 1;
     if (a->solver) a->fresh = 1;
+    a->from = a->now;
     if (a->activate) {
         status = a->starts_late ? OK : run_partition(a, t);
         a->starts_late = 0, a->now = end;
@@ -487,10 +551,14 @@ step(Adapter *a, double t, double h, bool unused, bool *event, bool *ends, bool 
     for (int64_t i = 0; status <= WARNING; i++) {
         if ((status = handle_time_events(a, most)) > WARNING || a->ends || a->now >= end) break;
         double until = same(a->next, end) ? fmax(a->next, end) : fmin(a->next, end);
+        int64_t row = rows_before(a, rint((a->now - a->start) * 1e9) / 1e9, true);
+        bool cuts = row < a->rows_count && !is_due(until, a->start + a->rows_time[row]);
+        if (cuts) until = a->start + a->rows_time[row];
         if (i == MOST_STEPS) status = fail(a, ENDLESS_STEPS);
         else if (a->events >= most) status = fail(a, ENDLESS_EVENTS);
         else if (a->step) status = cosimulate(a, until, &idle);
         else status = a->solver ? solve_elsewhere(a, until) : solve(a, until);
+        if (cuts && status <= WARNING && !a->ends && a->now == until) status = pass_jump(a, row);
     }
     if (a->ends || status > WARNING) *ends = a->ends && status <= WARNING, *reached = a->now;
     return status;
@@ -547,6 +615,7 @@ EXPORT void empty(Adapter *a) { forget(a); }
 EXPORT int keep_values(Adapter *a, int type, const void *references, size_t n, const void *values, size_t count) {
     return keep(a, type, references, n, values, count);
 }
+EXPORT int set_followed(Adapter *a, double t) { return follow(a, t); }
 EXPORT size_t size_of(int type) { return bytes[type]; }
 
 EXPORT void release(Adapter *a) {

@@ -7,6 +7,8 @@ from typing import Any
 from fmpy import sundials
 from fmpy.fmi1 import FMICallException
 
+from orchestration.components.fmi.slaves import WARNING
+
 _AT_ROOT = 2
 """Code that CVode returns where an event indicator has changed its sign"""
 _MOST_STEPS = 1_000_000
@@ -18,8 +20,9 @@ SOLVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.POINTER(ctypes.c_
 class Cvode:
     """The solver of one instance, which begins anew at each step of a run, so that a state has no history."""
 
-    def __init__(self, fmu: Any, adapter: Any, version: int) -> None:
-        self._fmu, self._adapter, self._solver = fmu, adapter, None
+    def __init__(self, fmu: Any, adapter: Any, version: int, follow: Callable[[int, float], int]) -> None:
+        """`follow` sets the inputs of an adapter that follow lines."""
+        self._fmu, self._adapter, self._follow, self._solver = fmu, adapter, follow, None
         self._failure: str | None = None
         self._derivatives = fmu.getDerivatives if version == 2 else fmu.getContinuousStateDerivatives
         self.function = SOLVE(self.solve)
@@ -53,7 +56,7 @@ class Cvode:
             raise RuntimeError(solver.error_info[-1] if solver.error_info else f"code {flag}")
         crosses[0] = flag == _AT_ROOT
         a.now = reached.value if flag == _AT_ROOT and reached.value < until else until
-        self._call(self._fmu.setTime)(a.now)
+        self._set_time(a.now)
         if a.states:
             self._call(self._fmu.setContinuousStates)(solver.px, a.states)
         return 0 if self._failure is None else 3
@@ -64,13 +67,18 @@ class Cvode:
             nx=a.states, nz=a.crossings, get_x=self._call(fmu.getContinuousStates),
             set_x=self._call(fmu.setContinuousStates), get_dx=self._call(self._derivatives),
             get_z=self._call(fmu.getEventIndicators), get_nominals=self._call(fmu.getNominalsOfContinuousStates),
-            set_time=self._call(fmu.setTime), input=self, startTime=a.now, relativeTolerance=a.tolerance,
+            set_time=self._set_time, input=self, startTime=a.now, relativeTolerance=a.tolerance,
             maxNumSteps=_MOST_STEPS,
         )  # fmt: skip
         return self._solver
 
     def apply(self, time: float) -> None:
-        """Inputs are constant in a step."""
+        """Inputs are set with the time, for the derivatives too, where fmpy does not call this."""
+
+    def _set_time(self, time: float) -> None:
+        self._call(self._fmu.setTime)(time)
+        if self._follow(ctypes.addressof(self._adapter), time) > WARNING:
+            self._failure = f"its inputs at {time:g} s are refused"
 
     def _call(self, function: Callable[..., Any]) -> Callable[..., None]:
         """The function, whose failure is kept: CVODE would not see an exception."""

@@ -162,6 +162,13 @@ class Instance(Simulator, Protocol):
         """
         raise UsageError(f"{self.name}: has no clock")
 
+    def follow(self, inputs: Sequence[str], times: Floats, values: Floats) -> None:
+        """Have inputs follow lines within its steps, before initialisation, by model exchange.
+
+        The lines lead through the rows of `values` (n, m), a column for each input, at `times` (n,) of the run [s].
+        """
+        raise UsageError(f"{self.name}: holds its inputs in a step")
+
     def beside(self, instance_name: str, access: Access) -> "Instance":
         """Another partition of the same instance of an FMU; raises `QuadcosimError` where there can be none."""
         raise QuadcosimError(

@@ -95,6 +95,10 @@ class IsolatedInstance(Instance):
         """As any instance."""
         self._request("set_clock", period, offset, late)
 
+    def follow(self, inputs: Sequence[str], times: Floats, values: Floats) -> None:
+        """As any instance."""
+        self._request("follow", tuple(inputs), times.tobytes(), values.tobytes())
+
     def take_events(self) -> Floats:
         """As any instance; without asking one that has none."""
         if not self.has_events or self.failed:

@@ -41,6 +41,10 @@ class _Server:
         assert self.instance is not None
         self.instance.set_clock(period, offset, late=late)
 
+    def _follow(self, inputs: tuple[str, ...], times: bytes, values: bytes) -> None:
+        assert self.instance is not None
+        self.instance.follow(inputs, np.frombuffer(times), np.frombuffer(values).reshape(-1, len(inputs)))
+
     def _take_events(self) -> bytes:
         assert self.instance is not None
         return self.instance.take_events().tobytes()

@@ -120,32 +120,6 @@ def late_jump(system: System) -> str | None:
     )
 
 
-def held_line(system: System) -> str | None:
-    """The warning about an input along a line, which model exchange holds in each step: the most that it changes."""
-    (component,) = system.components.values()
-    step, end = component.step, system.stop_time
-    if step is None or read_model(component.fmu, component.access).interface != "model-exchange":
-        return None
-    found = dict[str, float]()
-    grid = step * np.arange(math.ceil(end / step - 1e-9) + 1)
-    for source in system.sources.values():
-        if source.interpolation == "linear":
-            times, values = table_of(source, end)
-            rows = times[(times > 0.0) & (times < end)]
-            for column, to in zip(values.T, source.to):
-                rises = np.where(np.diff(times) > 0.0, np.diff(column), 0.0)  # a jump ends a step
-                line = functools.partial(np.interp, xp=times, fp=np.append(0.0, rises.cumsum()))
-                within = line(rows) - line(np.floor(rows / step) * step)
-                found[variable_of(to)] = float(np.abs(np.append(within, np.diff(line(grid)))).max())
-    name = max(found, key=found.__getitem__, default=None)
-    if name is None or not found[name]:
-        return None
-    return (
-        f"input {name} changes by up to {found[name]:.3g} in a step of {step:.10g} s, in which model exchange holds "
-        "it: a smaller --output-interval follows the line between rows more closely"
-    )
-
-
 def _jumps(sources: Mapping[str, Source], end: float) -> Iterator[tuple[float, str]]:
     """The times of a run up to `end` at which inputs jump [s], and their names."""
     for source in sources.values():
@@ -209,7 +183,10 @@ def _recorded(model: Model, names: Sequence[str]) -> tuple[str, ...] | None:
 
 
 def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, Source]:
-    """The columns of a file as inputs: continuous ones along the line between rows, all others held."""
+    """The columns of a file as inputs: continuous ones along the line between rows, all others held.
+
+    A solver of this program has the line, as fmpy's; an FMU that solves itself has its values at communication points.
+    """
     known, columns = model.names("input"), dict[str, str]()
     for column in header_of(inputs):
         elements = [each for each in known if model.variables[each].whole == column]
@@ -226,7 +203,7 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
     if not columns:
         raise UsageError(f"{inputs}: feeds no input; expected {TIME} and columns of its inputs, {listed(known)}")
     _expect_numbers_of_type(model, inputs, columns)
-    sources = {}
+    sources, solved = {}, model.interface == "model-exchange"
     for interpolation, continuous in (("linear", True), ("previous", False)):
         fed = [each for each in columns if (model.variables[each].variability == "continuous") is continuous]
         if fed:
@@ -234,6 +211,7 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
             sources[f"{interpolation}_inputs"] = Source(
                 to=to, file=inputs, interpolation="linear" if continuous else "previous",
                 columns=tuple(columns[each] for each in fed), start_time=begin or None, outside="held",
+                within_steps=continuous and solved,
             )  # fmt: skip
     return sources
 

@@ -28,7 +28,7 @@ from orchestration.simulation.engines.master import Engine, Master, create_maste
 from orchestration.simulation.engines.memory import Allocator, process_memory
 from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, resolve
 from orchestration.simulation.engines.running_system import RunningSystem
-from orchestration.simulation.engines.sources import SourceValues
+from orchestration.simulation.engines.sources import SourceValues, TableValues
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.schedule.compiled_timetable import timetable
@@ -263,6 +263,9 @@ def _feeds(system: System, sources: Mapping[str, SourceValues], instances: Mappi
         for component in dict.fromkeys(map(component_of, ends)):
             places = [i for i, end in enumerate(ends) if component_of(end) == component]
             into: Floats = np.zeros(len(places))
-            write = instances[component].writer([variable_of(ends[i]) for i in places], into)
+            inputs = [variable_of(ends[i]) for i in places]
+            write = instances[component].writer(inputs, into)
+            if isinstance(values, TableValues) and system.sources[name].within_steps:
+                instances[component].follow(inputs, values.time, values.columns[:, places])
             feeds.append(Feed(component, values, places, into, write, count=len(ends)))
     return feeds

@@ -51,7 +51,9 @@ def check(system: System, models: Mapping[str, Model]) -> None:
         if not (source.to or source.trajectory or source.is_motion):
             raise UsageError(f"sources.{name}.to = nothing: expected inputs; only a motion may feed none")
         for end in source.to:
-            _expect_input(f"sources.{name}.to", end, _end(models, end))
+            _expect_input(f"sources.{name}.to", end, found := _end(models, end))
+            if source.within_steps:
+                _expect_solved(f"sources.{name}.within_steps = true", found)
         if source.trajectory is not None and source.trajectory not in system.components:
             known = ", ".join(system.components)
             raise UsageError(f"sources.{name}.trajectory = {source.trajectory}: expected one of the components {known}")
@@ -159,6 +161,15 @@ def _expect_input(place: str, end: str, found: End) -> Variable:
     if variable.kind not in NUMERIC:
         raise UsageError(f"{place}: {end} is a {variable.kind}; only {listed(NUMERIC)} can be connected")
     return variable
+
+
+def _expect_solved(place: str, found: End) -> None:
+    """Raise `UsageError` for an input that cannot change within a step."""
+    name, model, variable = found
+    if model.interface != "model-exchange":
+        raise UsageError(f"{place}: {name} is called by {model.interface}; expected model-exchange")
+    if variable is None or variable.type not in ("Real", "Float64", "Float32") or variable.variability != "continuous":
+        raise UsageError(f"{place}: {name} changes at events only; expected continuous inputs")
 
 
 def _missing_variables(model: Model, causality: str, missing: list[str]) -> str:

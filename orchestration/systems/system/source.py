@@ -40,6 +40,9 @@ class Source:
     outside: Outside | None = None
     """The values of such a file before its first and after its last row: these rows' (held); default: it must cover
     the run."""
+    within_steps: bool = False
+    """Whether FMUs for model exchange follow the lines between such rows also within their steps; default: they hold
+    the values that a step begins with."""
     columns: tuple[str, ...] | None = None
     """The columns of the file in the order of the inputs; default: the names of the inputs."""
     noise: float | None = None
@@ -115,6 +118,8 @@ class Source:
         for key in ("start_time", "outside"):
             given = getattr(self, key)
             require(is_table or given is None, key, given, "none but for a file with a column for each input")
+        follows = is_table and self.interpolation == "linear" and self.scale == 1.0
+        require(follows or not self.within_steps, "within_steps", "true", "false but for lines of a file as they are")
         require(self.start_time is None or is_finite(self.start_time), "start_time", self.start_time, "a finite number")
 
     def _expect_signal(self) -> None:

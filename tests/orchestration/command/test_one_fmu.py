@@ -190,15 +190,48 @@ def test_a_table_that_does_not_fit_the_inputs_is_refused(main: Main, here: Path,
     assert f"table.csv: {refusal}" in main("run", fmu, "--inputs", inputs, code=2).stderr
 
 
+LINES = "time,u,w\n5,0,0\n5.7,1.4,0\n6,2,0\n6,-1,0\n6.3,0.5,0\n7,4,0\n"
+
+
 @needs_compiler
-def test_model_exchange_says_how_much_a_ramp_changes_in_the_steps_that_hold_it(main: Main, here: Path) -> None:
-    fmu, inputs = exchange(here, "integrator"), here / "ramp.csv"
-    flags = ("--in-process", "--inputs", inputs, "--stop-time", "2", "--output-interval", "0.5")
-    inputs.write_text("time,u,w\n0,0,0\n2,4,1\n")
-    warned = main("run", fmu, "--interface", "model-exchange", *flags).stderr
-    assert "ramp.csv: input u changes by up to 1 in a step of 0.5 s, in which model exchange holds it: " in warned
-    inputs.write_text("time,u,w\n0,0,0\n1,0,0\n1,4,1\n2,4,1\n")
-    assert "holds it" not in main("run", fmu, "--interface", "model-exchange", *flags).stderr
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("more", [(), ("--in-process", "--engine", "python"), ("--solver", "cvode")])
+def test_the_solver_has_inputs_along_their_lines_as_the_exact_integral(
+    main: Main, here: Path, fmi: int, more: tuple[str, ...]
+) -> None:
+    inputs, out = here / "lines.csv", here / "out.csv"
+    inputs.write_text(LINES)
+    flags = ("--start-time", "5", "--stop-time", "7", "--output-interval", "0.5", "--tolerance", "1e-10")
+    recorded = [word for name in ("x1", "x2", "updates") for word in ("--record", name)]
+    fmu = exchange(here, "integrator", fmi=fmi)
+    main("run", fmu, "--inputs", inputs, *flags, *more, "--output", out, *recorded)
+    found = read_csv(str(out))
+    assert found["time"].tolist() == [5.0, 5.5, 6.0, 6.5, 7.0]
+    x1, x2, exact = 1.0, 0.0, [(1.0, 0.0)]
+    for h, u, slope in ((0.5, 0, 2), (0.2, 1, 2), (0.3, 1.4, 2), (0.3, -1, 5), (0.2, 0.5, 5), (0.5, 1.5, 5)):
+        x1, x2 = x1 + h * (x2 + h * (u / 2 + h * slope / 6)), x2 + h * (u + h * slope / 2)
+        exact.append((x1, x2))
+    for name, values in zip(("x1", "x2"), zip(*(exact[k] for k in (0, 1, 3, 5, 6)))):
+        assert found[name] == pytest.approx(values, abs=1e-8)
+    if not more and fmi == 3:  # fmpy holds them in a step, of an FMU without event indicators
+        how = {"start_time": 5.0, "stop_time": 7.0, "output_interval": 2**-7, "relative_tolerance": 1e-8}
+        by_fmpy(fmu, inputs, output=["x1"], record_events=False, **how)
+        assert read_csv("by_fmpy.csv")["x1"][-1] == pytest.approx(x1, abs=0.05)
+    assert found["updates"].tolist()[-1] == 2  # at the beginning, and at the jump
+
+
+@needs_compiler
+def test_a_source_of_a_system_is_followed_within_steps_where_it_says_so(here: Path) -> None:
+    (here / "lines.csv").write_text(LINES)
+    source = {"to": ["it.u"], "file": "lines.csv", "start_time": 5.0, "within_steps": True}
+    component = {"fmu": str(exchange(here, "integrator")), "step": 2.0}
+    system: dict[str, Any] = {"stop_time": 2.0, "components": {"it": component}, "sources": {"lines": source}}
+    assert run(system, in_process=True).signals["it.x2"][-1] == pytest.approx(2.5, abs=1e-8)  # with its jump inside
+    del source["within_steps"]
+    assert run(system, in_process=True).signals["it.x2"][-1] == 0.0
+    source["within_steps"], component["fmu"] = True, str(small(here))
+    with pytest.raises(UsageError, match=r"within_steps = true: it.u is called by co-simulation; expected model-ex"):
+        run(system, in_process=True)
 
 
 @needs_compiler

@@ -82,7 +82,7 @@ static int get(Model *m, const uint32_t *r, size_t n, double *out) {
     return 0;
 }
 static int set(Model *m, const uint32_t *r, size_t n, const double *in) {
-    if (m->mode == 2) return 3; /* between events nothing is set here */
+    if (m->mode == 2 && m->kind != INTEGRATOR) return 3; /* between events nothing is set, but what the solver follows */
     for (size_t i = 0; i < n; i++) {
         if (m->kind == LAW && m->mode && (r[i] == U || r[i] == W) && !m->ticking[0]) m->misused++;
         m->v[r[i]] = in[i];
