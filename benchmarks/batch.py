@@ -31,9 +31,10 @@ from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus
-from orchestration.simulation.runs.many_runs import fly, located
 from orchestration.simulation.runs.prepared import prepared
+from orchestration.simulation.workers.many_runs import fly
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
+from orchestration.systems.system.files import located
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 

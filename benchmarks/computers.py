@@ -15,10 +15,10 @@ from dataclasses import replace
 
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.engines.batch.batches import Batches
-from orchestration.simulation.runs.many_runs import located
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.computers import Computer, Task
 from orchestration.systems.system.distribution import Distribution
+from orchestration.systems.system.files import located
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 

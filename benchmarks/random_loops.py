@@ -16,7 +16,7 @@ import numpy as np
 
 from orchestration.components.building import fmus
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.runs.many_runs import fly
+from orchestration.simulation.workers.many_runs import fly
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.file import load_system

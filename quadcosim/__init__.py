@@ -72,7 +72,6 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice
     from orchestration.quadrotor.scenarios.vehicle import load_vehicle
     from orchestration.simulation.runs.flights import Flights
-    from orchestration.simulation.runs.many_runs import fly
     from orchestration.simulation.runs.outcome import RunInterrupted, RunLost
     from orchestration.simulation.runs.pause import resume
     from orchestration.simulation.runs.pause import run_until as fly_until
@@ -81,6 +80,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.simulation.runs.scheduling import Scheduled, schedule
     from orchestration.simulation.runs.simulation import run
     from orchestration.simulation.runs.stepping import Simulation
+    from orchestration.simulation.workers.many_runs import fly
     from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival
     from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
     from orchestration.systems.system.connection import Connection

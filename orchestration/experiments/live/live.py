@@ -27,10 +27,10 @@ from orchestration.simulation.requests.request import RequestLike, default_reque
 from orchestration.simulation.results.display_names import signal
 from orchestration.simulation.results.objectives import GOOD
 from orchestration.simulation.results.units import column_infos
-from orchestration.simulation.runs.many_runs import located
 from orchestration.systems.expressions.syntax import names, parse
 from orchestration.systems.system.check import check, connect_references
 from orchestration.systems.system.connection import component_of
+from orchestration.systems.system.files import located
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.systems.system.request import Request, errors_in_own_terms

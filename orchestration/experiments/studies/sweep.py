@@ -35,7 +35,13 @@ from orchestration.simulation.results.own_metrics import metrics_from_sources
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.workers.batching import Sample, chunks
 from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution
-from orchestration.simulation.workers.executors import TaskRunner, cluster, expect_scheduler, local_workers
+from orchestration.simulation.workers.executors import (
+    TaskRunner,
+    cluster,
+    expect_scheduler,
+    expect_workers,
+    local_workers,
+)
 from orchestration.simulation.workers.pool import Inputs
 from orchestration.simulation.workers.provenance import versions
 from orchestration.simulation.workers.row import Rows
@@ -169,8 +175,7 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, 
 
 
 def _expect_workers(workers: int, dask: str | None) -> None:
-    if workers < 1:
-        raise UsageError(f"--workers {workers}: expected at least 1")
+    expect_workers(workers)
     if dask is not None:
         expect_scheduler(dask)
 

@@ -17,10 +17,10 @@ from orchestration.simulation.engines.batch.stepped_batch import SteppedBatch
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.columns import columns
-from orchestration.simulation.runs.many_runs import located
 from orchestration.simulation.runs.replacement import replace_component
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.systems.system.check import connect_references
+from orchestration.systems.system.files import located
 from orchestration.systems.system.request import errors_in_own_terms
 
 

@@ -1,1 +1,1 @@
-"""Worker processes, here or by dask: their tasks, the engine they take, and what the bits of a run depend on."""
+"""Worker processes, here or by dask: their tasks, their engine, what bits depend on; runs from arrays into arrays."""

@@ -4,6 +4,7 @@ import atexit
 import concurrent.futures
 import contextlib
 import logging
+import numbers
 import re
 import socket
 import threading
@@ -16,7 +17,7 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, shown
 from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.workers.batching import batched, chunks
@@ -48,8 +49,7 @@ class RunEvaluator:
     """
 
     def __init__(self, files: Files, workers: int, engine: Engine | None = None, *, dask: str | None = None) -> None:
-        if workers < 1:
-            raise UsageError(f"--workers {workers}: expected at least 1")
+        expect_workers(workers)
         if dask is not None:
             expect_scheduler(dask)
         self._files, self._workers, self._engine, self._dask = files, workers, engine, dask
@@ -266,6 +266,12 @@ def _close(client: Any) -> None:
     """Close a client whose scheduler may not answer."""
     with contextlib.suppress(Exception):
         client.close(timeout=_PATIENCE)
+
+
+def expect_workers(workers: int) -> None:
+    """Raise `UsageError` for what is no number of processes."""
+    if isinstance(workers, bool) or not isinstance(workers, numbers.Integral) or workers < 1:
+        raise UsageError(f"--workers {shown(workers)}: expected at least 1, a whole number")
 
 
 def expect_scheduler(address: str) -> None:

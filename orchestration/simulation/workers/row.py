@@ -30,6 +30,8 @@ class Outcome:
     """the engine that its metrics are of, by its name in `--engine`; None if it failed"""
     signals: bytes | None = None
     """its signals as the bytes of a Parquet file if they are kept"""
+    rows: Floats | None = None
+    """the rows of the columns that are recorded, the time [s] first"""
     ended: bool = False
     """whether it was stopped at a limit"""
 
@@ -51,6 +53,8 @@ class Results:
     """the kind of machine that ran them"""
     signals: Mapping[int, bytes] = field(default_factory=dict)
     """Signals by the place of the run"""
+    rows: Mapping[int, Floats] = field(default_factory=dict)
+    """Recorded rows by the place of the run"""
     ended: frozenset[int] = frozenset()
     """Places of those that were stopped at a limit"""
 
@@ -71,6 +75,7 @@ class Results:
             durations=np.array([each.duration for each in outcomes], dtype=np.float64),
             engines=[each.engine for each in outcomes], machine=machine,
             signals={i: each.signals for i, each in enumerate(outcomes) if each.signals is not None},
+            rows={i: each.rows for i, each in enumerate(outcomes) if each.rows is not None},
             ended=frozenset(i for i, each in enumerate(outcomes) if each.ended),
         )  # fmt: skip
 
@@ -78,7 +83,7 @@ class Results:
     def joined(cls, parts: Sequence["Results"]) -> "Results":
         """Those of several tasks as those of one; none of them has signals."""
         names = dict.fromkeys(name for part in parts for name in part.numbers)
-        begins = accumulate(map(len, parts), initial=0)
+        begins = [*accumulate(map(len, parts), initial=0)]
         return cls(
             numbers={
                 name: np.concatenate([part.numbers.get(name, np.full(len(part), np.nan)) for part in parts])
@@ -90,6 +95,7 @@ class Results:
             durations=np.concatenate([part.durations for part in parts]),
             engines=[engine for part in parts for engine in part.engines],
             machine=next((part.machine for part in parts if part.machine is not None), None),
+            rows={first + place: rows for first, part in zip(begins, parts) for place, rows in part.rows.items()},
             ended=frozenset(first + place for first, part in zip(begins, parts) for place in part.ended),
         )
 
@@ -104,8 +110,10 @@ class Results:
     def fits(self, count: int) -> bool:
         """Whether every column has an entry for each of `count` runs."""
         arrays = (self.failed, self.durations, *self.numbers.values())
-        return all(each.shape == (count,) and each.dtype.kind in "bif" for each in arrays) and all(
-            len(each) == count for each in (self.texts, self.messages, self.engines)
+        return (
+            all(each.shape == (count,) and each.dtype.kind in "bif" for each in arrays)
+            and all(len(each) == count for each in (self.texts, self.messages, self.engines))
+            and all(place < count and each.ndim == 2 for place, each in self.rows.items())
         )
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance
 from orchestration.components.fmi.read_description import read_model
@@ -21,6 +23,7 @@ from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.workers.row import Outcome, Results, Rows
+from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.files import all_with_files, with_files
 from orchestration.systems.system.input_files import input_files
 from orchestration.systems.system.model import System
@@ -38,6 +41,8 @@ class RunTask:
     key: str
     system: System
     keep_signals: bool = False
+    record: Sequence[str] | None = None
+    """Columns whose rows are wanted after the time; None: no rows"""
     metrics: tuple[OwnMetric, ...] = ()
     """the study's own metrics, besides those of the system"""
     engine: Engine | None = None
@@ -73,6 +78,8 @@ class TaskBatch:
     """Real ones of each run, as COMPONENT.NAME, overriding those of its system"""
     limit: float | None = None
     """Limit of processor time of a run [s]; None: unlimited"""
+    record: Sequence[str] | None = None
+    """Columns whose rows are wanted after the time, in lanes those of components alone; None: no rows"""
 
     @classmethod
     def of(cls, tasks: Sequence[RunTask]) -> "TaskBatch":
@@ -100,13 +107,16 @@ class TaskBatch:
             index=[self.index[i] for i in runs], key=[self.key[i] for i in runs], seed=[self.seed[i] for i in runs],
             systems=[self.systems[place] for place in used], places=[at[self.places[i]] for i in runs],
             parameters={name: values[runs] for name, values in self.parameters.items()}, limit=self.limit,
+            record=self.record,
         )  # fmt: skip
 
     def alone(self, run: int) -> RunTask:
         """One of the runs as a task of its own."""
         parameters = {name: float(values[run]) for name, values in self.parameters.items()}
         system = with_values(self.systems[self.places[run]], self.seed[run], parameters)
-        return RunTask(index=self.index[run], key=self.key[run], system=system, time_limit=self.limit)
+        return RunTask(
+            index=self.index[run], key=self.key[run], system=system, time_limit=self.limit, record=self.record
+        )
 
     def rows(self, results: Results) -> Rows:
         """Their rows, whatever their worker, which runs foreign code, says that they are of."""
@@ -187,7 +197,7 @@ class Runner:
 
     def _alone(self, task: RunTask) -> Outcome:
         started = time.perf_counter()
-        metrics, message, signals, engine = None, None, None, None
+        metrics, message, signals, rows, engine = None, None, None, None, None
         _expect_files(task.system)
         try:
             with prepared(task.system, load=self._load, engine=task.engine) as simulation:
@@ -198,6 +208,7 @@ class Runner:
                 metrics, message = {**result.metrics, **own}, result.divergence or result.termination
                 engine = str(result.provenance["engine"])
                 signals = _parquet(result) if task.keep_signals else None
+                rows = None if task.record is None else rows_of(result.signals, task.record)
         except (SimulatorError, UsageError) as error:
             message = str(error)
         except (QuadcosimError, OSError, MemoryError) as error:
@@ -205,7 +216,7 @@ class Runner:
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
         duration = time.perf_counter() - started
-        return Outcome(metrics=metrics, message=message, duration=duration, engine=engine, signals=signals)
+        return Outcome(metrics=metrics, message=message, duration=duration, engine=engine, signals=signals, rows=rows)
 
     def _in_lanes(self, batch: TaskBatch) -> list[Outcome]:
         started = time.perf_counter()
@@ -217,15 +228,20 @@ class Runner:
 
                 self._batches = Batches()
             systems = [batch.systems[place] for place in batch.places]
-            found = self._batches.run(systems, batch.parameters, batch.seed)
+            record = None if batch.record is None else of_components(systems[0], batch.record)
+            found = dict[int, Outcome]()
+            for run, each, rows in self._batches.each(systems, record, batch.parameters, batch.seed):
+                if each is not None:
+                    found[run] = Outcome(
+                        metrics=each.metrics, message=each.message, engine=BATCH,
+                        rows=None if record is None else rows.copy(),
+                    )  # fmt: skip
         except (QuadcosimError, OSError, MemoryError) as error:
             raise WorkerEnvironmentError(str(error) or type(error).__name__) from error
         duration = (time.perf_counter() - started) / len(batch)
         return [
-            self._alone(batch.alone(run))
-            if each is None
-            else Outcome(metrics=each.metrics, message=each.message, duration=duration, engine=BATCH)
-            for run, each in enumerate(found)
+            replace(found[run], duration=duration) if run in found else self._alone(batch.alone(run))
+            for run in range(len(batch))
         ]
 
     @contextmanager
@@ -241,6 +257,16 @@ class Runner:
     def close(self) -> None:
         """Free the FMUs."""
         self._instances.close()
+
+
+def of_components(system: System, record: Sequence[str]) -> list[str]:
+    """The recorded columns of components: lanes have no others."""
+    return [name for name in record if component_of(name) in system.components]
+
+
+def rows_of(signals: Mapping[str, Floats], record: Sequence[str]) -> Floats:
+    """The rows of columns, the time first."""
+    return np.column_stack([signals[name] for name in ("time", *(name for name in record if name != "time"))])
 
 
 def _expect_files(system: System) -> None:

@@ -1,6 +1,7 @@
 """The files of a study: FMUs and tables of sources, read once, so that what is hashed is what is run."""
 
 import hashlib
+import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,8 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.input_files import input_files, with_traces_at
 from orchestration.systems.system.model import System
 from orchestration.systems.system.source import Source
+
+_NOTES = logging.getLogger("quadcosim")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +75,18 @@ def files_of(system: System, fmus_too: Iterable[str] = (), tables_too: Iterable[
     of_components = {system.fmus[name]: path for name, path in fmus.of_components(system.fmus).items()}
     tables = {**files_read_by(system), **{name: Path(name) for name in tables_too}}
     return Files(fmus=of_components | {name: fmus.locate(name) for name in fmus_too}, tables=tables)
+
+
+def located(system: System) -> System:
+    """The system with the paths of its FMUs: native twins where they can be built, else those that it names."""
+    try:
+        twins = fmus.native_twins(system)
+        paths = fmus.of_components(twins.fmus)
+    except QuadcosimError as error:
+        _NOTES.debug("no native twins: %s", error)
+        paths = fmus.of_components(system.fmus)
+    components = {name: replaced(each, fmu=str(paths[name])) for name, each in system.components.items()}
+    return replaced(system, components=components)
 
 
 def files_read_by(system: System) -> dict[str, Path]:

@@ -12,9 +12,9 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch.batches import Batches
-from orchestration.simulation.runs.many_runs import located as with_files
 from orchestration.systems.schedule import schedule_cache
 from orchestration.systems.system.component import Component
+from orchestration.systems.system.files import located as with_files
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.source import Source

@@ -17,8 +17,8 @@ from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.engines.wasm.modules import sources_in, units_of
 from orchestration.simulation.engines.wasm.tables_of_system import SystemTables, tables_of
 from orchestration.simulation.requests.request import request_of
-from orchestration.simulation.runs.many_runs import located
 from orchestration.systems.system.check import connect_references
+from orchestration.systems.system.files import located
 
 _ADDRESSES = (
     "settings_of", "outcomes", "outcome_times", "step_counts", "row_counts", "rows_of", "values_of_objectives",

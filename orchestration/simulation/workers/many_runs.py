@@ -1,7 +1,8 @@
-"""Many runs of one system from arrays into arrays: in SIMD lanes where available, else one by one."""
+"""Many runs of one system from arrays into arrays, in SIMD lanes or one by one, here or by workers."""
 
+import contextlib
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -9,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
@@ -32,8 +32,13 @@ from orchestration.simulation.runs.arguments import names_in
 from orchestration.simulation.runs.columns import Columns, columns, first_differences
 from orchestration.simulation.runs.flights import Flights
 from orchestration.simulation.runs.simulation import run
+from orchestration.simulation.workers.batching import chunks
+from orchestration.simulation.workers.executors import expect_workers, local_workers
+from orchestration.simulation.workers.pool import Inputs
+from orchestration.simulation.workers.task import TaskBatch, of_components, rows_of
 from orchestration.systems.system.check import check, connect_references, recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
+from orchestration.systems.system.files import files_of, files_read_by, located
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import parameter_name
 from orchestration.systems.system.request import Request, errors_in_own_terms
@@ -48,6 +53,7 @@ def fly(
     outputs: Sequence[str] | None = None,
     record: Sequence[str] = (),
     metrics: Mapping[str, str] = MappingProxyType({}),
+    workers: int = 1,
     in_process: bool = False,
     progress: CountProgress = "bar",
 ) -> Flights:
@@ -63,12 +69,16 @@ def fly(
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
     else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
-    have a process each; `in_process`: all may run in lanes, and in this process, which they can end. `progress` is
-    called with the number of runs done and the total; None for silence.
+    have a process each; `in_process`: all may run in lanes, and in this process, which they can end. With `workers`
+    above one, so many processes of this machine share the runs, whose numbers are the same to the bit; it pays where
+    the runs take longer than some 3 s, as starting the processes takes one or two. `progress` is called with the number
+    of runs done and the total; None for silence.
 
     Raises `UsageError` for a path, an output or a column that does not exist, arrays that do not broadcast, and invalid
-    values; and what `run` raises for a run that fails, naming it.
+    values; and what `run` raises for a run that fails, naming it; of workers, which repeat a run that ends its process,
+    a `QuadcosimError`.
     """
+    expect_workers(workers)
     loaded, record = request_of(request), names_in(record, "record")
     with errors_in_own_terms(loaded):
         system = _measured(located(loaded.as_system()), metrics)
@@ -83,12 +93,13 @@ def fly(
         _warn_of_mismatches(loaded, runs, fits.parameters, models)
         reason = _reason_unavailable(fits.system, models, in_process)
         table = _Table(runs, names, record)
-        rows = (
-            _one_by_one(runs, range(runs.count), record, in_process)
-            if reason
-            else _in_lanes(runs, fits.parameters, record)
-        )
-        with runs_reporter(progress) as report:
+        if workers > 1:
+            rows = _by_workers(runs, fits.parameters, record, workers, in_lanes=reason is None)
+        elif reason:
+            rows = _one_by_one(runs, range(runs.count), record, in_process)
+        else:
+            rows = _in_lanes(runs, fits.parameters, record)
+        with runs_reporter(progress) as report, contextlib.closing(rows):
             for done, row in enumerate(rows, 1):
                 table.put(row)
                 report(done, runs.count)
@@ -108,8 +119,8 @@ class _RunRow:
 
     place: int
     metrics: Metrics
-    rows: Sequence[Floats]
-    """the time, then the recorded columns"""
+    rows: Floats | None
+    """columns: the time, then what is recorded; None if nothing is"""
     engine: str = BATCH
 
 
@@ -137,11 +148,11 @@ class _Table:
         for name, column in self._outputs.items():
             value = run.metrics[name]
             column[run.place] = value if name == OUTCOME else np.nan if value is None else float(value)
-        if self.recorded:
-            longer = len(run.rows[0]) - self._rows.shape[2]
+        if run.rows is not None:
+            longer = len(run.rows) - self._rows.shape[2]
             if longer > 0:
                 self._rows = np.pad(self._rows, ((0, 0), (0, 0), (0, longer)), constant_values=np.nan)
-            self._rows[:, run.place, : len(run.rows[0])] = run.rows
+            self._rows[:, run.place, : len(run.rows)] = run.rows.T
 
 
 def _booleans(name: str, column: Any) -> Any:
@@ -150,54 +161,70 @@ def _booleans(name: str, column: Any) -> Any:
     return np.asarray(column, dtype=np.bool_ if is_of_truth else None)
 
 
-def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Iterator[_RunRow]:
+def _in_lanes(runs: Columns, parameters: Mapping[str, float], record: Sequence[str]) -> Generator[_RunRow, None, None]:
     """All runs, in lanes but for those that must run alone; `parameters` are those of all components."""
-    places = {name: i for i, name in enumerate(_of_components(runs.system, record), 1)}
-    for place, summary, rows in Batches().each(
-        runs.systems, list(places) if record else None, runs.parameters, runs.seeds
-    ):
-        if len(rows) == MAX_ROWS:
-            raise UsageError(f"record: run {runs.name(place)} has more than {MAX_ROWS} rows; expected runs of fewer")
+    found = Batches().each(
+        runs.systems, of_components(runs.system, record) if record else None, runs.parameters, runs.seeds
+    )
+    for place, summary, rows in found:
         if summary is None:
             yield from _one_by_one(runs, [place], record, True)
-            continue
-        signals = {"time": rows[:, 0], **{name: rows[:, i] for name, i in places.items()}} if record else {}
-        if record and len(places) < len(record):
-            numbers = {**parameters, **{name: float(column[place]) for name, column in runs.parameters.items()}}
-            signals |= source_signals(runs.seeded(place), numbers, signals["time"])
-        yield _RunRow(place=place, metrics=summary.metrics, rows=_rows(signals, record))
+        else:
+            whole = _with_sources(runs, parameters, record, place, rows) if record else None
+            yield _RunRow(place=place, metrics=summary.metrics, rows=whole)
 
 
-def _one_by_one(runs: Columns, places: Iterable[int], record: Sequence[str], in_process: bool) -> Iterator[_RunRow]:
+def _one_by_one(
+    runs: Columns, places: Iterable[int], record: Sequence[str], in_process: bool
+) -> Generator[_RunRow, None, None]:
     """Runs one by one, by `run`."""
     for place in places:
         try:
             result = run(runs.alone(place), in_process=in_process)
         except QuadcosimError as error:
             raise type(error)(f"run {runs.name(place)}: {error}") from error
-        rows = _rows(result.signals, record)
+        rows = rows_of(result.signals, record) if record else None
         yield _RunRow(place=place, metrics=result.metrics, rows=rows, engine=result.provenance["engine"])
 
 
-def _rows(signals: Mapping[str, Floats], record: Sequence[str]) -> list[Floats]:
-    return [signals[name] for name in ("time", *(name for name in record if name != "time"))] if record else []
+def _by_workers(
+    runs: Columns, parameters: Mapping[str, float], record: Sequence[str], workers: int, *, in_lanes: bool
+) -> Generator[_RunRow, None, None]:
+    """All runs as worker processes end them, with the numbers that they have here."""
+    different = {id(system): place for place, system in enumerate(runs.systems)}
+    tables = [str(file) for place in different.values() for file in files_read_by(runs.systems[place])]
+    place_of = {system: place for place, system in enumerate(different)}
+    batch = TaskBatch(
+        index=range(runs.count), key=[""] * runs.count,
+        seed=[runs.system.seed] * runs.count if runs.seeds is None else runs.seeds,
+        systems=[runs.systems[place] for place in different.values()],
+        places=[place_of[id(system)] for system in runs.systems], parameters=runs.parameters, record=record or None,
+    )  # fmt: skip
+    tasks = chunks([batch], runs.count, workers) if in_lanes else map(batch.alone, range(runs.count))
+    files = files_of(runs.system, tables_too=tables)
+    with local_workers(Inputs.of(files), workers) as fly_tasks, contextlib.closing(fly_tasks(tasks)) as found:
+        for place, results, at in ((place, part.results, at) for part in found for at, place in enumerate(part.index)):
+            metrics, rows = results.metrics(at), results.rows.get(at)
+            if metrics is None:
+                raise QuadcosimError(f"run {runs.name(place)}: {results.messages[at]}")
+            engine = str(results.engines[at])
+            if rows is not None and engine == BATCH:
+                rows = _with_sources(runs, parameters, record, place, rows)
+            yield _RunRow(place=place, metrics=metrics, rows=rows, engine=engine)
 
 
-def _of_components(system: System, record: Sequence[str]) -> list[str]:
-    """The recorded columns of components: lanes have no others."""
-    return [name for name in record if component_of(name) in system.components]
-
-
-def located(system: System) -> System:
-    """The system with the paths of its FMUs: native twins where they can be built, else those that it names."""
-    try:
-        twins = fmus.native_twins(system)
-        paths = fmus.of_components(twins.fmus)
-    except QuadcosimError as error:
-        _NOTES.debug("no native twins: %s", error)
-        paths = fmus.of_components(system.fmus)
-    components = {name: replace(each, fmu=str(paths[name])) for name, each in system.components.items()}
-    return replace(system, components=components)
+def _with_sources(
+    runs: Columns, parameters: Mapping[str, float], record: Sequence[str], place: int, rows: Floats
+) -> Floats:
+    """The rows of what is recorded of one run, of rows in lanes, which have columns of components alone."""
+    if len(rows) == MAX_ROWS:
+        raise UsageError(f"record: run {runs.name(place)} has more than {MAX_ROWS} rows; expected runs of fewer")
+    columns_in_lanes = ("time", *of_components(runs.system, record))
+    signals = dict(zip(columns_in_lanes, rows.T))
+    if len(signals) < len({"time", *record}):
+        numbers = {**parameters, **{name: float(column[place]) for name, column in runs.parameters.items()}}
+        signals |= source_signals(runs.seeded(place), numbers, signals["time"])
+    return rows_of(signals, record)
 
 
 def _measured(system: System, metrics: Mapping[str, str]) -> System:

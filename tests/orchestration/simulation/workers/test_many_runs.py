@@ -13,8 +13,8 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch import shape
-from orchestration.simulation.runs.many_runs import located
 from orchestration.systems.system.component import Component
+from orchestration.systems.system.files import located
 from orchestration.systems.system.model import System
 from tests.native import NATIVE
 from tests.orchestration.components.fmi.small import needs_compiler, small
@@ -40,9 +40,19 @@ def assert_as_alone(found: quadcosim.Flights, place: int, alone: quadcosim.Resul
             assert column[place] == pytest.approx(np.nan if value is None else float(value), rel=1e-12, nan_ok=True)
 
 
+def assert_the_same_bits(one: quadcosim.Flights, other: quadcosim.Flights) -> None:
+    """Of all arrays, which have the same order."""
+    assert (one.engine, [*one]) == (other.engine, [*other])
+    for name, column in one.items():
+        assert (column.dtype, column.shape, column.tolist() if name == "outcome" else column.tobytes()) == (
+            other[name].dtype, other[name].shape, other[name].tolist() if name == "outcome" else other[name].tobytes(),
+        ), name  # fmt: skip
+
+
 @needs_compiler
 def test_each_run_of_arrays_is_the_run_alone() -> None:
     found = quadcosim.fly(SHORT, PLACES, record=RECORDED)
+    assert_the_same_bits(found, quadcosim.fly(SHORT, PLACES, record=RECORDED, workers=2))
     assert (found.engine, found.reason, found.units["position_rmse"]) == ("batch", None, "m")
     assert {name for name, column in found.items() if column.dtype != np.float64} == {"outcome", "good", "diverged"}
     assert found["good"].dtype == found["diverged"].dtype == np.bool_
@@ -104,6 +114,7 @@ def test_where_no_lanes_can_be_had_the_next_engine_flies_the_same_and_it_is_said
 
     monkeypatch.setattr(shape, "preferred_lanes", none)
     found = quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED)
+    assert_the_same_bits(found, quadcosim.fly(SHORT, {X: [0.0, 1.0]}, record=RECORDED, workers=2))
     assert (found.engine, found.reason) == ("compiled", "no compiler")
     assert list(found) == list(lanes)
     assert found["outcome"].tolist() == lanes["outcome"].tolist() == ["bounded", "bounded"]
@@ -216,6 +227,12 @@ WRONG: list[tuple[Any, dict[str, Any], str]] = [
     ({X: [0.0]}, {"record": ["wing.x"]}, r"^record: wing.x: expected COMPONENT.VARIABLE of plant, controller"),
     ({X: [0.0, 0.0], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run 1: "),
     ({X: [[0.0], [0.0]], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run \(0, 1\): "),
+    (
+        {X: [[0.0], [0.0]], "plant.initial.quaternion.w": [1.0, 0.0]},
+        {"workers": 2},
+        r"^run \(., 1\): .*expected a quaternion that is not zero$",
+    ),
+    ({X: [0.0]}, {"workers": 0}, r"^workers = 0: expected at least 1, a whole number$"),
 ]
 
 
