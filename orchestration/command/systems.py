@@ -71,7 +71,16 @@ def show(
     *,
     flags: FlightFlags,
 ) -> CommandResult:
-    """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units."""
+    """Show a system: components with their rates, connections with their delay, jitter, loss and hold, units.
+
+    Of an FMU without flags: what it declares, from its capabilities to its variables.
+    """
+    if system is not None and system.suffix.lower() == ".fmu" and out is None and flags == FlightFlags():
+        from orchestration.components.fmi import facts
+        from orchestration.components.fmi.read_description import read_model
+
+        found = facts.facts(read_model(system))
+        return CommandResult(document=found, lines=[*facts.as_lines(found)], verdict=found.verdict)
     from orchestration.systems.system.description import as_text
     from orchestration.systems.system.file_tables import tables_of
     from orchestration.systems.system.request import system_of

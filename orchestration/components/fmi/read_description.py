@@ -5,13 +5,14 @@ import itertools
 import math
 import zipfile
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
+from xml.etree.ElementTree import Element
 
 import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable, Unknown
@@ -88,8 +89,8 @@ class Variable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class InputClock:
-    """A periodic input clock, which the importer makes tick."""
+class DeclaredClock:
+    """A clock; an input clock that is periodic is one that the importer makes tick."""
 
     name: str
     reference: int
@@ -187,10 +188,8 @@ class Model:
     @cached_property
     def has_slopes(self) -> bool:
         """Whether it offers directional derivatives as it is called."""
-        interface = "ModelExchange" if self.interface == "model-exchange" else "CoSimulation"
-        element = read_root(read_archive(self.path, math.inf)).find(interface)  # fmpy does not read that of FMI 3.0
-        name = f"providesDirectionalDerivative{'s' if self.version == 3 else ''}"
-        return element is not None and element.get(name) in ("true", "1")
+        declared = attributes_of(self, self.interface, read_root(read_archive(self.path, math.inf)))
+        return declared.get(f"providesDirectionalDerivative{'s' if self.version == 3 else ''}") in ("true", "1")
 
     @property
     def once_per_process(self) -> bool:
@@ -233,29 +232,26 @@ class Model:
         return {name: parsed[unit] for name, unit in declared.items()}
 
     @cached_property
-    def clocks(self) -> tuple[InputClock, ...]:
+    def clocks(self) -> tuple[DeclaredClock, ...]:
         """Its periodic input clocks, by priority.
 
         Raises `UsageError` for a clock of another kind: its ticks would be instants of their own.
         """
         if not any(variable.kind == "Clock" for variable in self.variables.values()):
             return ()
-        root = read_root(read_archive(self.path, math.inf))  # fmpy does not read their intervals
-        types = {each.get("name"): each.attrib for each in root.iterfind("TypeDefinitions/ClockType")}
         found = []
-        for element in root.iterfind("ModelVariables/Clock"):
-            declared = {**types.get(element.get("declaredType"), {}), **element.attrib}
-            causality, kind = declared.get("causality", "local"), declared.get("intervalVariability", "")
-            if causality != "input" or kind not in PERIODIC:
+        for causality, clock in clocks_of(read_root(read_archive(self.path, math.inf))):
+            if causality != "input" or clock.variability not in PERIODIC:
                 raise UsageError(
-                    f"{self.path}: {declared['name']} is a clock of causality {causality} and interval {kind}, whose "
-                    "ticks would be instants of their own; expected periodic input clocks: constant, fixed or tunable"
+                    f"{self.path}: {clock.name} is a clock of causality {causality} and interval {clock.variability}, "
+                    "whose ticks would be instants of their own; expected periodic input clocks: constant, fixed or "
+                    "tunable"
                 )
-            found.append(_input_clock(declared))
+            found.append(clock)
         return tuple(sorted(found, key=lambda clock: clock.priority))
 
     @cached_property
-    def ticking(self) -> tuple[InputClock, ...]:
+    def ticking(self) -> tuple[DeclaredClock, ...]:
         """The clocks that tick as it is called, that of every sample first; of a partition, its own."""
         if self.interface == SCHEDULED:
             return () if self.access.clock is None else (self._base_clock(),)
@@ -264,7 +260,7 @@ class Model:
         base = self._base_clock()
         return (base, *(clock for clock in self.clocks if clock is not base))
 
-    def _base_clock(self) -> InputClock:
+    def _base_clock(self) -> DeclaredClock:
         if self.access.clock is not None:
             return next(clock for clock in self.clocks if clock.name == self.access.clock)
         return min(self.clocks, key=lambda clock: clock.interval or math.inf)
@@ -442,7 +438,15 @@ PERIODIC = ("constant", "fixed", "tunable")
 """Interval variabilities of periodic clocks"""
 
 
-def _input_clock(declared: Mapping[str, str]) -> InputClock:
+def clocks_of(root: Element) -> Iterator[tuple[str, DeclaredClock]]:
+    """The clocks in a description, with their causality; fmpy does not read their intervals."""
+    types = {each.get("name"): each.attrib for each in root.iterfind("TypeDefinitions/ClockType")}
+    for element in root.iterfind("ModelVariables/Clock"):
+        declared = {**types.get(element.get("declaredType"), {}), **element.attrib}
+        yield declared.get("causality", "local"), _clock(declared)
+
+
+def _clock(declared: Mapping[str, str]) -> DeclaredClock:
     if "resolution" in declared and "intervalCounter" in declared:
         unit = Fraction(1, int(declared["resolution"]))
         interval: Fraction | None = int(declared["intervalCounter"]) * unit
@@ -450,11 +454,21 @@ def _input_clock(declared: Mapping[str, str]) -> InputClock:
     else:
         interval = Fraction(declared["intervalDecimal"]) if "intervalDecimal" in declared else None
         shift = Fraction(declared.get("shiftDecimal", "0"))
-    return InputClock(
+    return DeclaredClock(
         name=declared["name"], reference=int(declared["valueReference"]),
-        variability=declared["intervalVariability"], interval=interval, shift=shift,
+        variability=declared.get("intervalVariability", ""), interval=interval, shift=shift,
         priority=int(declared.get("priority", "0")),
     )  # fmt: skip
+
+
+_ELEMENTS = {"co-simulation": "CoSimulation", "event-mode": "CoSimulation", "model-exchange": "ModelExchange"}
+
+
+def attributes_of(model: Model, interface: Interface, root: Element) -> Mapping[str, str]:
+    """The attributes by which a description declares an interface; fmpy does not read all of FMI 3.0."""
+    name = "Capabilities" if model.version == 1 else _ELEMENTS.get(interface, "ScheduledExecution")
+    element = next(root.iter(name), None)
+    return {} if element is None else element.attrib
 
 
 _KINDS: dict[str, Kind] = {

@@ -10,7 +10,7 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.access import SCHEDULED
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
-from orchestration.components.fmi.read_description import NUMERIC, InputClock, Model, called, read_model
+from orchestration.components.fmi.read_description import NUMERIC, DeclaredClock, Model, called, read_model
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
@@ -169,7 +169,7 @@ def _expect_clock(name: str, component: Component, model: Model) -> None:
             )
 
 
-def _expect_ticks(name: str, sampling: Sampling | None, clock: InputClock) -> None:
+def _expect_ticks(name: str, sampling: Sampling | None, clock: DeclaredClock) -> None:
     """Raise `UsageError` for samples at which a clock of an FMU cannot tick."""
     place = f"components.{name}.sampling"
     if sampling is None:
