@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.simulation.runs.arguments import function_in, names_in, values_by_path
@@ -50,7 +50,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         """
         self.simulation = Simulation(request, component)
         """The simulation that it steps: names of observations and actions, and the result of a finished episode."""
-        self._reward, self._starts, self._observe = _chosen(reward, starts, observe)
+        self._reward, self._starts, self._observe = _chosen(reward, starts, observe, self.simulation.names)
         self.action_space = _actions(self.simulation.commanded, low, high)
         self.observation_space = _observations(self.simulation.measured, self._observe)
 
@@ -116,7 +116,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
         self.runs = SteppedRuns(request, component, num_envs)
         """The runs that it steps: names of observations and actions."""
         self.num_envs = num_envs
-        self._reward, self._starts, self._observe = _chosen(reward, starts, observe)
+        self._reward, self._starts, self._observe = _chosen(reward, starts, observe, self.runs.names)
         self.single_action_space = _actions(self.runs.commanded, low, high)
         self.single_observation_space = _observations(self.runs.measured, self._observe)
         batched = gymnasium.vector.utils.batch_space
@@ -200,13 +200,17 @@ def _episode(random: np.random.Generator, starts: InitialValues | None) -> tuple
 
 
 def _chosen(
-    reward: Reward, starts: InitialValues | None, observe: Sequence[str]
+    reward: Reward, starts: InitialValues | None, observe: Sequence[str], known: Sequence[str]
 ) -> tuple[Reward, InitialValues | None, tuple[str, ...]]:
     """What an environment is made with; raises `UsageError` for what is not of its kind."""
     function_in(reward, "reward", "the values after a step, which returns a number")
     if starts is not None:
         function_in(starts, "starts", "a generator of random numbers, which returns values by path")
-    return reward, starts, names_in(observe, "observe")
+    observed = names_in(observe, "observe")
+    for name in observed:
+        if name not in known:
+            raise UsageError(f"observe: {name}: {expected_name(name, known)}")
+    return reward, starts, observed
 
 
 def _options(options: Any) -> dict[str, Any]:

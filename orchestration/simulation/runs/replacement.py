@@ -7,8 +7,9 @@ from typing import Any
 from orchestration.components.building import fmus
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, expected_name
-from orchestration.simulation.engines.resolved import ResolvedRequest, check_against_fmus
+from orchestration.simulation.engines.resolved import ResolvedRequest, check_against_fmus, columns_of
 from orchestration.simulation.runs.arguments import values_by_path
+from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -54,6 +55,13 @@ def replace_component(request: Request, component: str | None) -> Replacement:
     return Replacement(
         request=request, component=name, system=whole, models=models, measured=measured, commanded=commanded
     )
+
+
+def names_of(system: System, models: Mapping[str, Model]) -> tuple[str, ...]:
+    """What has a value at an instant of a run: the time, columns of components, and signals of sources."""
+    recorded = recorded_variables(system, models)
+    columns = [f"{name}.{variable}" for name, variables in recorded.items() for variable in variables]
+    return (*dict.fromkeys((*columns_of(system), *columns)),)
 
 
 def component_named(system: System, component: str | None, to: str) -> str:

@@ -17,7 +17,7 @@ from orchestration.simulation.engines.batch.stepped_batch import SteppedBatch
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.columns import columns
-from orchestration.simulation.runs.replacement import replace_component
+from orchestration.simulation.runs.replacement import names_of, replace_component
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.systems.system.check import connect_references
 from orchestration.systems.system.files import located
@@ -64,6 +64,8 @@ class SteppedRuns:
             expect_lanes(self._system, found.models)
         self._models, self.component = found.models, found.component
         self.measured, self.commanded = found.measured, found.commanded
+        self.names = names_of(self._system, self._models)
+        """The names that have a value"""
         self.count = count
         self._lanes, self._schedules = preferred_lanes(), ScheduleCache()
         self._shapes: dict[Any, Shape] = {}
@@ -119,11 +121,6 @@ class SteppedRuns:
             group.batch.command(by_lane[:, i * width : (i + 1) * width])
             group.batch.proceed()
             self._collect(group)
-
-    @property
-    def names(self) -> Sequence[str]:
-        """The names that have a value."""
-        return self._groups[0].batch.names
 
     def value(self, name: str) -> Floats:
         """The value of a column, of a source, or of `time` [s] in each run now.

@@ -22,7 +22,7 @@ from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.outcome import RunOutcome, result_of
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
-from orchestration.simulation.runs.replacement import replace_component
+from orchestration.simulation.runs.replacement import names_of, replace_component
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.substitute import Abandoned, Substitute
 from orchestration.systems.schedule.streams import Streams
@@ -102,6 +102,11 @@ class Simulation:
     def time(self) -> float:
         """The time [s] of the last measurement."""
         return seconds(self._under_way.master.running.now)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that `values` has in a run."""
+        return names_of(self._replacement.resolve({}, None).system, self._replacement.models)
 
     @property
     def values(self) -> dict[str, float]:

@@ -39,8 +39,6 @@ class SteppedBatch(Batch):
         self._views: dict[str, Floats] = {"time": np.zeros(shape.lanes), **dict(seen)}
         columns = [column for column in shape.board.columns if column != "time"]
         self._places = Named({column: shape.place(column) for column in columns})
-        self.names = (*columns, *self._views)
-        """The names that have a value"""
         self.count = 0
         """The number of runs; the others of its lanes are empty"""
 

@@ -89,8 +89,9 @@ def test_bounds_that_are_none_are_refused(low: Any, high: Any) -> None:
         ),
         ({"starts": lambda random: 3}, r"^starts: returned 3: expected a dictionary of values by path"),
         ({"observe": "time"}, r"^observe = 'time': expected a list of names$"),
+        ({"observe": ["plant.tlt"]}, r"^observe: plant.tlt: did you mean plant.tilt\? expected one of time, plant.thr"),
     ],
-    ids=["reward", "starts", "what starts returns", "observe"],
+    ids=["reward", "starts", "what starts returns", "observe", "what is observed"],
 )
 def test_what_an_environment_cannot_be_made_with_is_refused_in_a_line(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError, match=message):
@@ -193,6 +194,8 @@ def test_the_projects_controller_as_a_policy_flies_as_fly_has_it() -> None:
 def test_what_cannot_be_is_refused_in_a_line_in_lanes_too() -> None:
     with pytest.raises(UsageError, match=r"^num_envs = 0: expected a positive whole number$"):
         gym.VectorEnvironment(SHORT, reward, num_envs=0, low=LOW, high=HIGH)
+    with pytest.raises(UsageError, match=r"^observe: plant.tlt: did you mean plant.tilt\? expected one of time"):
+        gym.VectorEnvironment(SHORT, reward, num_envs=2, low=LOW, high=HIGH, observe=["plant.tlt"])
     many = gym.VectorEnvironment(SHORT, lambda now: 1.0, num_envs=2, low=LOW, high=HIGH)
     with pytest.raises(UsageError, match=r"^step: no run is under way; expected reset before it$"):
         many.step(np.zeros((2, 4)))
