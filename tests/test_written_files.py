@@ -38,7 +38,7 @@ EXCEPTIONS = {
     (f"{_INTEROP}/tools/cofmupy.py", "np.save"): _OF_A_TOOL,
     (f"{_INTEROP}/tools/container.py", "copyfile"): _OF_A_TOOL,
     (f"{_INTEROP}/tools/container.py", "write_text"): _OF_A_TOOL,
-    ("orchestration/simulation/runs/folder.py", "rename"): "a whole run that cannot take its place is kept beside it",
+    ("orchestration/simulation/runs/run_directory.py", "rename"): "a whole run that cannot take its place is kept beside it",
     ("orchestration/simulation/workers/pool.py", "TemporaryDirectory"): "in the temporary folder of the pool",
 }
 """Reasons for writing otherwise, by module and function"""

@@ -2,15 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Container, Mapping
-from contextlib import AbstractContextManager
-from dataclasses import asdict, replace
+from collections.abc import Callable, Container, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
-from fmu_kit.new_files import write_atomically
+from fmu_kit.new_files import NewFiles, WriteError, clear, write_atomically
 from orchestration.foundation.basics.documents import read_json
-from orchestration.foundation.basics.errors import Named, SimulatorError, UsageError, one_line, shown
+from orchestration.foundation.basics.errors import Named, QuadcosimError, SimulatorError, UsageError, one_line, shown
 from orchestration.foundation.recording import tables
 from orchestration.foundation.recording.tables import ToFolder
 from orchestration.simulation.engines.resolved import columns_of
@@ -18,10 +18,76 @@ from orchestration.simulation.figures.names import FORMATS
 from orchestration.simulation.figures.views import files, view_of
 from orchestration.simulation.requests.request import load_request
 from orchestration.simulation.results.units import ColumnInfo
-from orchestration.simulation.runs.folder import NewFolder, new_folder
 from orchestration.simulation.runs.outcome import RunInterrupted
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.system.request import system_of
+
+
+@dataclass(kw_only=True)
+class NewFolder:
+    """A folder that is written at `path` and moved to `place` when complete."""
+
+    path: Path
+    place: Path
+    precious: bool = False
+    """Whether it is kept beside its place if it cannot be completed or moved there"""
+    replaces: bool = True
+    """Whether it takes the place of an existing folder, instead of being kept beside it"""
+
+
+@contextmanager
+def new_folder(place: Path, replaceable: Callable[[Path], bool], expected: str) -> Iterator[NewFolder]:
+    """A folder that is moved to its `place` on success and removed on failure, unless it is `precious`.
+
+    Raises `UsageError` at once if `place` holds something that is not `replaceable`, stating what was `expected`, or if
+    nothing can be written there; `WriteError`; `QuadcosimError` stating where a precious one is kept.
+    """
+    clear(place.parent)
+    _expect_place(place, replaceable, expected)
+    try:
+        files = NewFiles(place.parent)
+    except WriteError as error:
+        raise UsageError(f"{place}: expected a directory that can be written: {error.strerror}") from error
+    new = NewFolder(path=files.path / place.name, place=place)
+    try:
+        new.path.mkdir()
+        yield new
+        if new.replaces or _is_free(place):
+            _expect_place(place, replaceable, expected)
+            files.publish(replaces_folders=True)
+        else:
+            new.place = _beside(new.path, place)
+    except BaseException as error:
+        told = files.error_of(error) if isinstance(error, OSError) else None
+        if new.precious and isinstance(error, Exception):
+            raise QuadcosimError(f"{told or error}; what was written is in {_beside(new.path, place)}") from error
+        if told is not None:
+            raise told from error
+        raise
+    finally:
+        files.remove()  # does nothing after success
+
+
+def _expect_place(place: Path, replaceable: Callable[[Path], bool], expected: str) -> None:
+    if place.exists():
+        if place.resolve() == Path.cwd():
+            raise UsageError(f"{place}: expected another directory than the one you are in")
+        if not (_is_free(place) or (place.is_dir() and replaceable(place))):
+            raise UsageError(f"{place}: expected {expected}")
+
+
+def _is_free(place: Path) -> bool:
+    return not place.exists() or (place.is_dir() and not any(place.iterdir()))
+
+
+def _beside(new: Path, place: Path) -> Path:
+    """Move `new` to the first free name beside its place; returns that."""
+    number = 1
+    while (beside := place.with_name(f"{place.name}.{number}")).exists():
+        number += 1
+    new.rename(beside)
+    return beside
+
 
 SIGNALS, EVENTS = tables.SIGNALS, tables.EVENTS
 METRICS, SCENARIO, PROVENANCE = "metrics.json", "scenario.toml", "provenance.json"
