@@ -16,9 +16,9 @@ from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.running_system import RunningSystem
+from orchestration.simulation.figures.lines import plain
 from orchestration.simulation.figures.palette import GREY, MARKS
 from orchestration.simulation.figures.style import DOCS, save
-from orchestration.simulation.figures.ticks import plain
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, Sampling

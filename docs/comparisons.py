@@ -19,7 +19,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison import figures as plots
-from orchestration.experiments.comparison.cells import CellSummary, Median, Share, sizes
+from orchestration.experiments.comparison.cells import (
+    FATES,
+    RESIDUAL,
+    SETTLING,
+    CellSummary,
+    Median,
+    Share,
+    sizes,
+    survived,
+)
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.figures import BINS, Reach
 from orchestration.experiments.comparison.file import load_comparison
@@ -27,7 +36,6 @@ from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import as_json
 from orchestration.experiments.comparison.run import compare
-from orchestration.experiments.comparison.survival import FATES, RESIDUAL, SETTLING, survived
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.statistics import first_end, wilson

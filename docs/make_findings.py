@@ -19,8 +19,8 @@ import quadcosim
 from docs import charts, claim_records, comparisons, theory
 from docs import processor as processors
 from docs.theory import PAPER
+from orchestration.experiments.comparison.cells import FATES, SETTLING, survived
 from orchestration.experiments.comparison.run import rerun_cells
-from orchestration.experiments.comparison.survival import FATES, SETTLING, survived
 from orchestration.experiments.limits import figure, limit
 from orchestration.experiments.studies import drawing, figures
 from orchestration.experiments.studies.store import open_for_reading, store_path
@@ -28,9 +28,8 @@ from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.sweep import AGREEMENT, sweep
 from orchestration.foundation.basics.statistics import first_end, quantile, wilson
-from orchestration.quadrotor.flight.hover_limit import about_hover
+from orchestration.quadrotor.flight.hover_limit import about_hover, margin_of
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.flight.margin import margin_of
 from orchestration.simulation.figures.style import DOCS, save
 from orchestration.simulation.workers.batching import LaneAgreement
 

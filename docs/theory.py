@@ -9,8 +9,7 @@ import numpy as np
 
 import quadcosim
 from fmu_kit.trajectory import Trajectory
-from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.linked_settings import LinkedSettings
+from orchestration.experiments.studies.axes import Axis, LinkedSettings
 from orchestration.experiments.studies.study import Study
 from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_limit import local_limit

@@ -21,6 +21,7 @@ WRITERS = {
 """Names of functions that write, move or make files, with their module where the name alone is ambiguous"""
 
 _INTEROP = "orchestration/simulation/interop"
+_RUNS = "orchestration/simulation/runs"
 _OF_A_TOOL = "a process of another tool writes into the temporary folder of the comparison"
 EXCEPTIONS = {
     ("orchestration/components/building/builder.py", "TemporaryFile"): "has no name, so nothing can be left",
@@ -38,7 +39,7 @@ EXCEPTIONS = {
     (f"{_INTEROP}/tools/cofmupy.py", "np.save"): _OF_A_TOOL,
     (f"{_INTEROP}/tools/container.py", "copyfile"): _OF_A_TOOL,
     (f"{_INTEROP}/tools/container.py", "write_text"): _OF_A_TOOL,
-    ("orchestration/simulation/runs/run_directory.py", "rename"): "a whole run that cannot take its place is kept beside it",
+    (f"{_RUNS}/run_directory.py", "rename"): "a whole run that cannot take its place is kept beside it",
     ("orchestration/simulation/workers/pool.py", "TemporaryDirectory"): "in the temporary folder of the pool",
 }
 """Reasons for writing otherwise, by module and function"""

@@ -8,7 +8,7 @@ from docs.website.tables import inline_html, table
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.experiments.limits.limit_result import Limit
 from orchestration.foundation.basics.attribute_docs import attribute_docs
-from orchestration.quadrotor.flight.margin import Margin
+from orchestration.quadrotor.flight.hover_limit import Margin
 from orchestration.systems.schedule.responses import Responses, Spread
 from orchestration.theory.certificates.margin import Certified
 from orchestration.theory.exact.expect import Expected

@@ -71,8 +71,8 @@ def compare(
 
 def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table: str | None) -> CommandResult:
     """The results of all cells, as text or in the format of a `table`; `again` is the command for one of them."""
-    from orchestration.command import comparison_text
-    from orchestration.command.comparison_table import comparison_table
+    from orchestration.command import comparison_tables
+    from orchestration.command.comparison_tables import comparison_table
     from orchestration.experiments.comparison.outcome import as_json
 
     summary = compared.summary
@@ -88,7 +88,7 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table
     document = {**content, "follows": summary.follows, "files": compared.written}
     verdict = compared.verdict
     if table is None:
-        lines = list(comparison_text.lines(comparison, compared.outcome))
+        lines = list(comparison_tables.lines(comparison, compared.outcome))
         return CommandResult(document=document, verdict=verdict, lines=lines, good=not summary.failed)
     inform(verdict)  # standard output is the table alone, for a file
     lines = list(printed_tables.lines(comparison_table(comparison, compared.outcome), table))
@@ -97,11 +97,11 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table
 
 def _cell(comparison: "Comparison", rerun: "CellSummary", stored: "CellSummary | None") -> CommandResult:
     """The results of a cell that was run again, and whether the store has the same."""
-    from orchestration.command import comparison_text
+    from orchestration.command import comparison_tables
     from orchestration.experiments.comparison.run import agree
 
     same = None if stored is None else agree(stored, rerun)
-    lines = list(comparison_text.cell_lines(comparison, rerun))
+    lines = list(comparison_tables.cell_lines(comparison, rerun))
     if same is not None:
         lines.append(f"{'in the store':<22}  {'the same' if same else 'a different result'}")
     document = {**rerun.as_json(), "same_as_stored": same}

@@ -118,7 +118,7 @@ def _checked(path: Path, request: "Request | None") -> CommandResult:
 def _of_hover(request: "Request") -> CommandResult:
     """The delays of the quadrotor about hover: constant ones exactly, varying ones by bounds."""
     from orchestration.components.fmi.foreign_calls import isolated_call
-    from orchestration.quadrotor.flight.margin import margin_of
+    from orchestration.quadrotor.flight.hover_limit import margin_of
     from orchestration.quadrotor.scenarios.scenario import Scenario
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of

@@ -6,8 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from orchestration.components.building import fmus
-from orchestration.experiments.studies.axes import Axis, Value
-from orchestration.experiments.studies.linked_settings import Key, LinkedSettings
+from orchestration.experiments.studies.axes import Axis, Key, LinkedSettings, Value
 from orchestration.experiments.studies.study import StartValues, Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record

@@ -19,10 +19,9 @@ from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.studies.axes import Value
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells
-from orchestration.simulation.figures.lines import abreast
+from orchestration.simulation.figures.lines import abreast, plain
 from orchestration.simulation.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
 from orchestration.simulation.figures.style import SCREEN, Style
-from orchestration.simulation.figures.ticks import plain
 from orchestration.simulation.results.quantities import Quantity
 
 BINS = 8

@@ -16,8 +16,7 @@ from orchestration.experiments.comparison.design import (
     VehicleEntry,
     over_second_axis,
 )
-from orchestration.experiments.studies.axes import Axis, Value
-from orchestration.experiments.studies.linked_settings import Key
+from orchestration.experiments.studies.axes import Axis, Key, Value
 from orchestration.experiments.studies.study_file import AxisTable, FileLike, axis_of, control_loop_of, load
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed

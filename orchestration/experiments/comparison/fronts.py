@@ -1,12 +1,11 @@
-"""Pareto fronts of error and effort, over the initial conditions that all controllers survive."""
+"""Controllers against each other: Pareto fronts of error and effort, and pairs of each with the first."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from orchestration.experiments.comparison.cells import Median
+from orchestration.experiments.comparison.cells import Median, settled, survived
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
-from orchestration.experiments.comparison.survival import survived
 from orchestration.experiments.studies.axes import Value
 
 if TYPE_CHECKING:
@@ -69,3 +68,81 @@ def _dominates(one: tuple[float | None, float | None], other: tuple[float | None
     """Whether `one` is no worse in both and better in one."""
     pairs = [(a, b) for a, b in zip(one, other) if a is not None and b is not None]
     return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)
+
+
+_RATIOS = 2
+"""reported for a pair: error and effort"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """A controller and the first of the file, at one value of the axis."""
+
+    vehicle: str
+    condition: str
+    value: Value
+    controller: str
+    against: str
+    both: int
+    """initial conditions that both survive"""
+    only_it: int
+    only_other: int
+    neither: int
+    settles: int
+    """Number from which it settles minus the number from which the other settles; one that diverges does not settle"""
+    error: Median
+    effort: Median
+    """medians of the ratio of its value to that of the first where both survive; the intervals hold for all pairs of
+    the comparison together (Bonferroni)"""
+
+    def row(self) -> dict[str, Any]:
+        """The row of the table."""
+        return {**vars(self), **self.error.columns("error"), **self.effort.columns("effort")}
+
+
+def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
+    """All controllers but the first, at each value of the axis."""
+    first, *others = (one.name for one in comparison.controllers)
+    done = table[table["status"] == "done"]
+    places = len(comparison.vehicles) * len(comparison.conditions) * len(comparison.values)
+    confidence = 1.0 - 0.05 / max(1, len(others) * places * _RATIOS)
+    for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
+        by_name = {name: one.set_index(START) for name, one in rows.groupby(CONTROLLER, sort=False)}
+        if first not in by_name:
+            continue
+        for name in others:
+            if name in by_name:
+                place = {"vehicle": vehicle, "condition": condition, "value": value}
+                yield _pair(comparison, place, name, by_name[name], by_name[first], confidence)
+
+
+def _pair(
+    comparison: Comparison,
+    place: dict[str, Value],
+    name: str,
+    it: "pd.DataFrame",
+    other: "pd.DataFrame",
+    confidence: float,
+) -> Pair:
+    known = it.index.intersection(other.index)
+    mine, its = survived(it.loc[known]), survived(other.loc[known])
+    both = known[mine & its]
+    ahead = settled(it.loc[known]).sum() - settled(other.loc[known]).sum()
+    ratios = [
+        Median.of((it.loc[both, metric] / other.loc[both, metric]).to_numpy(float), confidence)
+        for metric in (comparison.front.error, comparison.front.effort)
+    ]
+    return Pair(
+        vehicle=str(place["vehicle"]),
+        condition=str(place["condition"]),
+        value=place["value"],
+        controller=name,
+        against=comparison.controllers[0].name,
+        both=len(both),
+        only_it=int((mine & ~its).sum()),
+        only_other=int((~mine & its).sum()),
+        neither=int((~mine & ~its).sum()),
+        settles=int(ahead),
+        error=ratios[0],
+        effort=ratios[1],
+    )

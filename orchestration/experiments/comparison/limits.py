@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.comparison.bandwidth import Bandwidths
+from orchestration.experiments.comparison.cells import FATES
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Case, Comparison
-from orchestration.experiments.comparison.survival import FATES
 from orchestration.foundation.basics.statistics import Estimate, first_end, quantile
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.experiments.comparison.survival import Fate
+    from orchestration.experiments.comparison.cells import Fate
 
 SHARES = {"half": 0.5, "nine in ten": 0.9}
 """Shares of the initial conditions that survive, or settle, up to the limit"""

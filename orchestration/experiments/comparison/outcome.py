@@ -12,11 +12,10 @@ import numpy as np
 from fmu_kit.new_files import new_files, write_atomically
 from orchestration.experiments.comparison import fronts
 from orchestration.experiments.comparison.bandwidth import Bandwidths
-from orchestration.experiments.comparison.cells import PEAK, CellSummary, Share, cell_summaries
+from orchestration.experiments.comparison.cells import PEAK, CellSummary, Share, cell_summaries, survived
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Case, Comparison
+from orchestration.experiments.comparison.fronts import Pair, pairs
 from orchestration.experiments.comparison.limits import GridLimit, limits
-from orchestration.experiments.comparison.pairs import Pair, pairs
-from orchestration.experiments.comparison.survival import survived
 from orchestration.experiments.studies.axes import Value
 from orchestration.foundation.basics.documents import plain
 

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestration.experiments.comparison.cells import sizes, tables_of_maps
+from orchestration.experiments.comparison.cells import FATES, WORDS, sizes, tables_of_maps
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, VEHICLE, Comparison
 from orchestration.experiments.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
-from orchestration.experiments.comparison.survival import FATES, WORDS
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.axis_labels import quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps

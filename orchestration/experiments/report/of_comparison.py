@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.experiments.comparison.cells import (
+    WORDS,
     CellSummary,
     Median,
     cell_summaries,
@@ -14,7 +15,6 @@ from orchestration.experiments.comparison.cells import (
 )
 from orchestration.experiments.comparison.cells import Share as CellShare
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, Comparison
-from orchestration.experiments.comparison.survival import WORDS
 from orchestration.experiments.report.model import (
     CellMap,
     ComparisonCells,

@@ -15,11 +15,11 @@ from orchestration.experiments.studies.axis_labels import SCALES, quantity_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.foundation.basics.unit_algebra import after
+from orchestration.simulation.figures.lines import plain
 from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED, SHADES
 from orchestration.simulation.figures.shades import is_wide
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.figures.style import save as write
-from orchestration.simulation.figures.ticks import plain
 from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.model import DIVERGED, TERMINATED
 

@@ -8,8 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from orchestration.components.building.fmus import native_twin, native_twins
-from orchestration.experiments.studies.axes import CONTROLLER, Axis, Method, Points, Value
-from orchestration.experiments.studies.linked_settings import LinkedSettings
+from orchestration.experiments.studies.axes import CONTROLLER, Axis, LinkedSettings, Method, Points, Value
 from orchestration.experiments.studies.store_columns import is_column
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.records import record

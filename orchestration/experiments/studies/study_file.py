@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypeVar, cast
 
 from orchestration.components.building.models import PATHS
-from orchestration.experiments.studies.axes import CONTROLLER, Axis, Scale, Value, span
-from orchestration.experiments.studies.linked_settings import LinkedSettings
+from orchestration.experiments.studies.axes import CONTROLLER, Axis, LinkedSettings, Scale, Value, span
 from orchestration.experiments.studies.study import Study, names_fmu
 from orchestration.foundation.basics.documents import copied_tables, read_toml, tables_in
 from orchestration.foundation.basics.errors import UsageError, prefixed, shown

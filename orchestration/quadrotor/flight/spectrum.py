@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.flight.commands import COLUMNS
 from orchestration.simulation.figures.drawn_run import DrawnRun
-from orchestration.simulation.figures.lines import logarithmic, name_runs, positive, wrapped
+from orchestration.simulation.figures.lines import logarithmic, name_runs, plain, positive, wrapped
 from orchestration.simulation.figures.palette import BLACK, BLUE, GREEN, RED
 from orchestration.simulation.figures.style import Style
-from orchestration.simulation.figures.ticks import plain
 
 SEGMENTS = 8
 """Segments of the run, before they overlap by half"""

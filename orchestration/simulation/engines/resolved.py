@@ -19,7 +19,7 @@ from orchestration.simulation.engines.algebraic_loops import describe_loops
 from orchestration.simulation.results import objectives
 from orchestration.simulation.results.units import ColumnInfo, column_infos, units
 from orchestration.systems.expressions.over_run import job_terms
-from orchestration.systems.schedule.fixed_step import FixedStep
+from orchestration.systems.schedule.plan import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables

@@ -11,9 +11,9 @@ from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.patches import Patch, Rectangle
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.lines import plain
 from orchestration.simulation.figures.palette import GREY, RED, SHADES
 from orchestration.simulation.figures.shades import shades_of
-from orchestration.simulation.figures.ticks import plain
 
 LIMIT = {"colors": RED, "linewidths": 1.8}
 """Style of the line between good and other cells"""

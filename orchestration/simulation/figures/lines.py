@@ -1,5 +1,6 @@
 """Common parts of figures over time: lines of runs, legends, and peaks that do not fit the axis."""
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any, TypeAlias
@@ -7,8 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window, title
@@ -169,3 +172,22 @@ def _inset(axes: Axes, lines: Lines, outside: Floats, note: str, style: Style) -
     inset.set_title(note, fontsize=0.8 * style.font, color=BLACK, pad=0.2 * style.font)
     for side in inset.spines.values():
         side.set(visible=True, color=GREY, linewidth=0.05 * style.font)
+
+
+def plain(axis: Axis, at: Sequence[float] | None = None) -> None:
+    """3, 4, 5 instead of 4·10⁰ where a logarithmic axis spans less than two decades, or at the values `at`."""
+    if axis.get_scale() != "log":
+        return
+    low, high = sorted(axis.get_view_interval())
+    decades = math.log10(high / low) if low > 0.0 else math.inf
+    if at is not None:
+        axis.set_major_locator(FixedLocator([*at]))
+    elif decades < 0.8:
+        axis.set_major_locator(MaxNLocator(5))
+    elif decades < 2.0:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    else:
+        return
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())

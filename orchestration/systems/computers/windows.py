@@ -11,7 +11,7 @@ from fractions import Fraction
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import exact_nanoseconds, nanoseconds, seconds
-from orchestration.systems.computers.system_bounds import Bounds, bounds_of
+from orchestration.systems.computers.bounds import Bounds, bounds_of
 from orchestration.systems.system.component import SamplingOnArrival
 from orchestration.systems.system.distribution import highest, lowest
 from orchestration.systems.system.frames import frame_nanoseconds

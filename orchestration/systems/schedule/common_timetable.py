@@ -12,9 +12,8 @@ from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.basics.times import Grid, clock_grid, exact_nanoseconds, nanoseconds
-from orchestration.systems.schedule.fixed_step import FixedStep, in_seconds
 from orchestration.systems.schedule.instant_arrays import Schedule
-from orchestration.systems.schedule.plan import Plan, expect_no_longer
+from orchestration.systems.schedule.plan import FixedStep, Plan, expect_no_longer, in_seconds
 from orchestration.systems.system.component import has_scheduled_instants
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System

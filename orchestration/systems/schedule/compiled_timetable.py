@@ -19,9 +19,9 @@ from orchestration.foundation.basics.c_structures import address, constants, dec
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Instants, Span
-from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.instant_arrays import Schedule
 from orchestration.systems.schedule.lateness_and_loss import whole
+from orchestration.systems.schedule.plan import FixedStep
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, HIGHEST, JITTER, LOSS, LOWEST, NORMAL, Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.choices import Spread

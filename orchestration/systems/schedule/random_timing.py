@@ -8,9 +8,8 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Constant, clock_grid, nanoseconds
-from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment, in_seconds
 from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
-from orchestration.systems.schedule.plan import Plan
+from orchestration.systems.schedule.plan import FixedStep, Misalignment, Plan, in_seconds
 from orchestration.systems.schedule.streams import DELAY, DELAY_JITTER, JITTER, LOSS, Streams
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import highest

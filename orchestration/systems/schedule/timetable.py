@@ -13,8 +13,8 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.systems.schedule.common_timetable import CommonTimetable, InstantCollector, Span
-from orchestration.systems.schedule.fixed_step import FixedStep, Misalignment
 from orchestration.systems.schedule.instant_arrays import Schedule
+from orchestration.systems.schedule.plan import FixedStep, Misalignment
 from orchestration.systems.schedule.random_timing import (
     ClockedComponent,
     Link,

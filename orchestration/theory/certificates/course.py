@@ -14,10 +14,9 @@ from orchestration.systems.system.model import System
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.varying import Point
-from orchestration.theory.exact.branch import BranchEvent
+from orchestration.theory.exact.branch import BranchEvent, Piece
 from orchestration.theory.exact.effects import ContinuousEffects, Places
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
-from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.exact.timing_chain import TimingChain
 from orchestration.theory.stability.matrices import Components
 

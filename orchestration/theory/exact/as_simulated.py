@@ -10,11 +10,11 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
+from orchestration.theory.exact.branch import Piece
 from orchestration.theory.exact.effects import LoopEffects, Places
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, exact_seconds
 from orchestration.theory.exact.objectives import Mean
-from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.stability.matrices import Components, Continuous
 
 

@@ -21,12 +21,12 @@ from orchestration.theory.exact.branch import (
     Branch,
     BranchEvent,
     Mode,
+    Piece,
     in_transit,
     place_in,
 )
 from orchestration.theory.exact.effects import LoopEffects
 from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
-from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.exact.random_times import Kinks
 
 NEGLIGIBLE = 1e-13

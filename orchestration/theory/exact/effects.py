@@ -17,12 +17,11 @@ from orchestration.simulation.engines.connection_hold import of_each
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.theory.exact.branch import BranchEvent
+from orchestration.theory.exact.branch import BranchEvent, Piece
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.initial_state import InitialState
 from orchestration.theory.exact.links import ATTOSECONDS
 from orchestration.theory.exact.objectives import Mean
-from orchestration.theory.exact.pieces import Piece
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 
 

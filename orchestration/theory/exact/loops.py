@@ -25,7 +25,6 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.as_simulated import SimulatedEffects, expect_rows
 from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
-from orchestration.theory.exact.horizon import costs_until
 from orchestration.theory.exact.initial_state import InitialState, initial_state_of
 from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.moments import JumpLinear
@@ -33,7 +32,7 @@ from orchestration.theory.exact.objective_means import ObjectiveMeans
 from orchestration.theory.exact.repeating import periodic_schedule
 from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.exact.timing import links_of, sampled_tasks
-from orchestration.theory.exact.timing_chain import TimingChain
+from orchestration.theory.exact.timing_chain import TimingChain, costs_until
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, at_rest
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 

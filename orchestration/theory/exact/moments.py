@@ -14,8 +14,8 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Floats
+from orchestration.theory.exact.branch import Piece
 from orchestration.theory.exact.krylov import SIZE, Map, solve_fixed_point, spectral_radius_of
-from orchestration.theory.exact.pieces import Piece
 
 MAX_MOMENTS = 100_000
 """numbers in the second moments of all modes together"""

@@ -9,12 +9,11 @@ import pytest
 
 from orchestration.experiments.comparison import fronts, outcome
 from orchestration.experiments.comparison.bandwidth import Bandwidths
-from orchestration.experiments.comparison.cells import cell_summaries, table_of_runs
+from orchestration.experiments.comparison.cells import cell_summaries, survived, table_of_runs
 from orchestration.experiments.comparison.design import Comparison, Condition, Controller, VehicleEntry
+from orchestration.experiments.comparison.fronts import pairs
 from orchestration.experiments.comparison.limits import first_ends, limits
 from orchestration.experiments.comparison.outcome import as_json, outcome_of
-from orchestration.experiments.comparison.pairs import pairs
-from orchestration.experiments.comparison.survival import survived
 from orchestration.experiments.studies.axes import Axis
 from orchestration.systems.system.starts import Starts
 from quadcosim import Scenario

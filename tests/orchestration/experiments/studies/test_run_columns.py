@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.axes import Axis, LinkedSettings
 from orchestration.experiments.studies.checks import check_design, describe_run
-from orchestration.experiments.studies.linked_settings import LinkedSettings
 from orchestration.experiments.studies.run_columns import RunColumns
 from orchestration.experiments.studies.run_key import run_key
 from orchestration.experiments.studies.study import Study

@@ -15,7 +15,7 @@ import quadcosim
 from orchestration.quadrotor.flight import commands
 from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from orchestration.quadrotor.flight.path import extent
-from orchestration.quadrotor.flight.phase import surface
+from orchestration.quadrotor.flight.sliding import surface
 from orchestration.quadrotor.flight.spectrum import welch
 from orchestration.simulation.figures import signals
 from orchestration.simulation.figures.lines import clip_peaks

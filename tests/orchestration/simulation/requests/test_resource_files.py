@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
-from orchestration.simulation.requests.can_database import bus_of
-from orchestration.simulation.requests.resource_files import resources_of
-from orchestration.simulation.requests.task_table import computers_of
+from orchestration.simulation.requests.resource_files import bus_of, computers_of, resources_of
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.proposal import propose
 from quadcosim import schedule

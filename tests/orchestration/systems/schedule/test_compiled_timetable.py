@@ -12,8 +12,8 @@ from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.systems.schedule import compiled_timetable
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Span
 from orchestration.systems.schedule.compiled_timetable import FILES, CompiledTimetable, reason_unavailable, timetable
-from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.instant_arrays import Schedule
+from orchestration.systems.schedule.plan import FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, Sampling

@@ -9,7 +9,7 @@ import pytest
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.runs.scheduling import Scheduled, schedule
-from orchestration.systems.computers.system_bounds import bounds_of
+from orchestration.systems.computers.bounds import bounds_of
 from orchestration.systems.system.file import system_from_tables
 
 MS = 1e-3

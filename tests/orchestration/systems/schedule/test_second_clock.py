@@ -23,7 +23,7 @@ from orchestration.quadrotor.scenarios.wiring import MEASUREMENT
 from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.systems.schedule import instant_arrays as position
-from orchestration.systems.schedule.fixed_step import FixedStep
+from orchestration.systems.schedule.plan import FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.choices import Spread

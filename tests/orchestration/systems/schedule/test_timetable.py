@@ -8,9 +8,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.systems.schedule import instant_arrays
 from orchestration.systems.schedule.common_timetable import CommonTimetable
-from orchestration.systems.schedule.fixed_step import FixedStep
 from orchestration.systems.schedule.instant_arrays import Cursor
-from orchestration.systems.schedule.plan import MAX_TIME
+from orchestration.systems.schedule.plan import MAX_TIME, FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.paths import changed

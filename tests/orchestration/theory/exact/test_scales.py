@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from orchestration.theory.exact.branch import Piece
 from orchestration.theory.exact.moments import JumpLinear, Passage
-from orchestration.theory.exact.pieces import Piece
 
 
 def loop_of(size: int, units: float) -> JumpLinear:
