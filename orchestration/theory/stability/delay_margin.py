@@ -1,32 +1,38 @@
 """The delay margin of a command: how much later it may come before the loop is unstable, in whole nanoseconds.
 
 A delay by a part of a sample shifts the hold at a receiver in continuous time, and at a sampled one it acts in jumps,
-where a message misses a sample. So the loop is made as late by such a part; whole samples are further states of it, or,
-where all samples of a period are alike, a turn of the phase.
+where a message misses a sample. So the loop is made as late by such a part; whole samples are further states of it. A
+loop tolerates a further delay d of all samples for certain where, with its complementary sensitivity T over them and
+the frequencies W that they consist of, d σ(T W) < 1 (a small gain): so far the next delay is not tried.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.number_text import quantity
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
-from orchestration.theory.stability.lifted_margins import places
 from orchestration.theory.stability.linearise import Linearised
-from orchestration.theory.stability.loop_halves import loop_gains, radius, with_rest
-from orchestration.theory.stability.sign_changes import root, sign_changes, zero_between
+from orchestration.theory.stability.loop_halves import places, radius, sensitivity_of, with_rest
+from orchestration.theory.stability.poles import Complexes
+from orchestration.theory.stability.sign_changes import zero_between
 from orchestration.theory.stability.state_space import StateSpace, reduced
 
-FARTHEST = 5.0
-"""Longest delay of a command that is tried, in first estimates"""
-PARTS = 4
-"""Delays that are tried in a sample, where samples of a period differ"""
+SAFE = 0.75
+"""Share of a delay that is tolerated for certain, after which the next one is tried"""
+PARTS, FINEST = 8, 32
+"""Delays that are tried in a sample, and where less is tolerated for certain"""
+STILL = 1e-8
+"""Growth rate that counts as 0 [1/s]"""
+MOST = 500
+"""Delays that are tried, at most"""
 SIDES = (0.0, 1.0 / NANOSECONDS)
 """Delays beyond a jump [s]: none, and the next one"""
 MOST_JUMPS = 40
@@ -43,25 +49,27 @@ class Late:
     """Delays at which a command comes just at a sample of its receiver, and misses it with more [s]"""
 
 
-Crossover = tuple[float, float]
-"""A frequency at which the loop gain is 1 [rad/s], and the delay by which its phase is that of -1 [s]"""
-
-
-def delay_margin(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> float | None:
+def delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> float | None:
     """The least further delay of a command at which the loop becomes unstable [s].
 
-    Where it becomes so in a jump, that is the longest one at which it is stable. `crossovers` are those of the command,
-    without a further delay. None: no delay makes it unstable. Raises `UsageError` where it is not found.
+    Where it becomes so in a jump, that is the longest one at which it is stable. `frequencies` go up to half the rate
+    of the period [rad/s]. None: no delay makes it unstable. Raises `UsageError` where it is not found.
     """
-    if not crossovers:
+    command = LateCommand(loop=loop, i=i, frequencies=frequencies, late=late)
+    if not any(command.ends_stability(part) for part in (*np.arange(PARTS) * loop.dt / PARTS, *command.sides)):
         return None
-    of = _of_one_rate if loop.samples == 1 else _of_several
-    return of(loop, i, crossovers, late)
-
-
-def crossover_at(frequency: float, gain: complex) -> Crossover:
-    """A crossover, by its gain."""
-    return frequency, _turn(gain) / frequency
+    delay, before = 0.0, (0.0, command.growth(0.0))
+    for _ in range(MOST):
+        certain = SAFE * command.tolerated(delay)
+        if certain >= loop.dt:
+            delay = _rounded(delay + math.floor(certain / loop.dt) * loop.dt)
+            continue
+        delay = command.next(delay, certain)
+        now = delay, command.growth(delay)
+        if now[1] > 0.0:
+            return zero_between(command.growth, _rounded, before, now, zero=STILL)[0]
+        before = now
+    raise UsageError(f"the loop is stable with all delays up to {quantity(before[0], 's')}, the longest that was tried")
 
 
 def jumps_of(system: System, name: str) -> tuple[float, ...]:
@@ -79,73 +87,87 @@ def jumps_of(system: System, name: str) -> tuple[float, ...]:
     return tuple(float(jump) / NANOSECONDS for jump in sorted(found))
 
 
-def _of_one_rate(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> float:
-    """Between the whole samples where the first crossover comes to -1: there its phase is followed over the delay."""
-    dt = loop.dt
-    least = min(delay for _, delay in crossovers)
-    whole = math.floor(least / dt)
-    near = [one for one in crossovers if one[1] < least + 2.0 * dt]
+@dataclass(frozen=True, kw_only=True)
+class LateCommand:
+    """A loop, one command of which comes later."""
 
-    def beyond(delay: float) -> float:
-        rest = late.rest(_rounded(delay - whole * dt))
-        return max(_beyond(loop, i, rest, one, delay, whole) for one in near)
+    loop: Linearised
+    i: int
+    frequencies: Floats
+    late: Late
+    known: dict[float, tuple[Linearised, Complexes]] = field(default_factory=dict)
+    """By the part of a sample by which it is late: the loop, and the sensitivity of the command over its samples"""
 
-    low, high = whole * dt, (whole + 1) * dt
-    return zero_between(beyond, _rounded, (low, low - least), (high, high - least))[0]
+    @property
+    def sides(self) -> list[float]:
+        """The delays to both sides of each jump, less than a sample [s]."""
+        sides = {_rounded(jump + side) for jump in self.late.jumps for side in SIDES}
+        return sorted(side for side in sides if side < self.loop.dt)
 
+    def growth(self, delay: float) -> float:
+        """The growth rate of small deviations [1/s]."""
+        whole, part = self._split(delay)
+        found = radius(_with_samples(self._late_by(part)[0], self.i, whole))
+        return math.log(max(found, np.finfo(float).tiny)) / self.loop.rest.dt
 
-def _beyond(loop: Linearised, i: int, rest: StateSpace, crossover: Crossover, delay: float, whole: int) -> float:
-    """By how much a delay is beyond that at which a crossover, followed to a later rest, comes to -1 [s]."""
-    dt, (at, expected) = loop.dt, crossover
-    frequencies = np.linspace(0.8 * at, min(1.25 * at, math.pi / dt), 61)
+    def next(self, delay: float, most: float) -> float:
+        """The next delay that is tried: nearer than `most` where that is less than the usual interval."""
+        dt = self.loop.dt
+        interval = dt / (PARTS if most >= dt / PARTS else FINEST)
+        usual = (math.floor(max(delay + most, delay + interval) / interval + 0.01)) * interval
+        whole = math.floor(delay / dt) * dt
+        sides = (_rounded(begin + side) for begin in (whole, whole + dt) for side in self.sides)
+        return min((_rounded(usual), *(side for side in sides if side > delay)))
 
-    def gain(frequency: float) -> complex:
-        return complex(loop_gains(loop, np.array([frequency]), i, rest)[i, 0])
+    def tolerated(self, delay: float) -> float:
+        """The further delay that is tolerated for certain [s]."""
+        samples, dt = self.loop.samples, self.loop.dt
+        sensitivity = self._sensitivity(delay)
+        turns = np.arange(samples) - samples // 2
+        at = np.add.outer(self.frequencies, 2.0 * math.pi * turns / self.loop.rest.dt)
+        at = np.abs((at + math.pi / dt) % (2.0 * math.pi / dt) - math.pi / dt)
+        waves = np.exp(1j * np.outer(np.arange(samples), 2.0 * math.pi * turns / samples)) / math.sqrt(samples)
+        waves = waves * np.exp(1j * np.outer(self.frequencies * dt, np.arange(samples)))[:, :, None]
+        moved = (np.eye(samples) - sensitivity) @ waves * at[:, None, :]
+        return float(1.0 / max(np.linalg.norm(moved, 2, axis=(1, 2)).max(), np.finfo(float).tiny))
 
-    ends = sign_changes(frequencies, np.abs(loop_gains(loop, frequencies, i, rest)[i]) - 1.0)
-    if not ends:
-        return -2.0 * dt  # its gain is below 1 now
-    nearest = min(ends, key=lambda pair: abs(sum(pair) / 2.0 - at))
-    now = root(lambda w: abs(gain(w)) - 1.0, *nearest)
-    left = _turn(gain(now) * np.exp(-1j * now * dt * whole)) / now
-    whole_turn = 2.0 * math.pi / now
-    return -left - whole_turn * round((expected - delay - left) / whole_turn)
+    def ends_stability(self, part: float) -> bool:
+        """Whether enough whole samples beside a part of one make the loop unstable: its gain is somewhere above 1."""
+        samples = self.loop.samples
+        gains = np.linalg.inv(self._late_by(_rounded(part))[1]) - np.eye(samples)
+        each = (np.linalg.eigvals(gains @ self._shift(whole)) for whole in range(samples))
+        return any(bool(np.abs(values).max() > 1.0) for values in each)
 
+    def _sensitivity(self, delay: float) -> Complexes:
+        whole, part = self._split(delay)
+        soon = self._late_by(part)[1]
+        return np.asarray(np.linalg.solve(soon + (np.eye(self.loop.samples) - soon) @ self._shift(whole), soon))
 
-def _of_several(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> float:
-    """The first of a few delays in each sample at which the spectral radius is above 1, and the zero before it.
+    def _shift(self, whole: int) -> Complexes:
+        """A delay by whole samples at each frequency, shape (n, samples, samples)."""
+        samples = self.loop.samples
+        z = np.exp(1j * self.frequencies * self.loop.rest.dt)
+        found = np.zeros((len(z), samples, samples), dtype=complex)
+        for sample in range(samples):
+            periods, place = divmod(sample - whole, samples)
+            found[:, sample, place] = z**periods
+        return found
 
-    They are those to both sides of each jump, too.
-    """
-    dt, known = loop.dt, dict[float, Linearised]()
+    def _late_by(self, part: float) -> tuple[Linearised, Complexes]:
+        if part not in self.known:
+            loop = _with(self.loop, self.i, self.late.rest(part)) if part else self.loop
+            self.known[part] = loop, sensitivity_of(loop, self.i, self.frequencies)
+        return self.known[part]
 
-    def beyond(delay: float) -> float:
-        whole = math.floor(delay / dt + 0.5 / (NANOSECONDS * dt))
-        part = max(0.0, _rounded(delay - whole * dt))
-        if part not in known:
-            known[part] = _with(loop, i, late.rest(part)) if part else loop
-        return radius(_with_samples(known[part], i, whole)) - 1.0
-
-    before = (0.0, loop.radius - 1.0)
-    farthest = FARTHEST * min(delay for _, delay in crossovers) + dt
-    steps = range(1, math.ceil(PARTS * farthest / dt) + 1)
-    sides = (k * dt + jump + side for k in range(math.ceil(farthest / dt)) for jump in late.jumps for side in SIDES)
-    for delay in sorted({_rounded(one) for one in (*(step * dt / PARTS for step in steps), *sides)} - {0.0}):
-        now = delay, beyond(delay)
-        if now[1] > 0.0:
-            return zero_between(beyond, _rounded, before, now)[0]
-        before = now
-    raise UsageError(f"the loop is stable with all delays up to {quantity(before[0], 's')}, the longest that was tried")
+    def _split(self, delay: float) -> tuple[int, float]:
+        """Whole samples, and the part of one [s]."""
+        whole = math.floor(delay / self.loop.dt + 0.5 / (NANOSECONDS * self.loop.dt))
+        return whole, max(0.0, _rounded(delay - whole * self.loop.dt))
 
 
 def _rounded(delay: float) -> float:
     """A delay in whole nanoseconds."""
     return round(delay, 9)
-
-
-def _turn(gain: complex) -> float:
-    """The angle from -1 up to a gain, in a turn [rad]."""
-    return float(np.angle(-gain)) % (2.0 * math.pi)
 
 
 def _with(loop: Linearised, i: int, late: StateSpace) -> Linearised:

@@ -1,7 +1,7 @@
 """Loops in the frequency domain: each command's loop, the others closed, with its margins as a sampled loop."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -22,7 +22,7 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.theory.stability.delay_margin import Crossover, Late, crossover_at, delay_margin, jumps_of
+from orchestration.theory.stability.delay_margin import Late, delay_margin, jumps_of
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin, radius_with
 from orchestration.theory.stability.linearise import (
@@ -37,7 +37,7 @@ from orchestration.theory.stability.linearise import (
     stability_of,
 )
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
-from orchestration.theory.stability.loop_halves import closed, loop_gains, radius, sensitivities
+from orchestration.theory.stability.loop_halves import closed, loop_gains, radius
 from orchestration.theory.stability.operating_point import deterministic
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.sign_changes import root, sign_changes
@@ -222,10 +222,9 @@ def _bode(request: Request, component: str | None) -> Bode:
                 gains = loop_gains(loop, frequencies)
                 each = (_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop))
             else:
-                added = sensitivities(loop, frequencies)
-                curves = [lifted_gains(loop, i, frequencies, added) for i in _commands(loop)]
+                curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
                 gains = np.array([curve for curve, _ in curves])
-                each = (_lifted_margins(loop, i, frequencies, *curves[i], late, system) for i in _commands(loop))
+                each = (_lifted_margins(loop, i, frequencies, curves[i][1], late, system) for i in _commands(loop))
             found = list[LoopMargins]()
             for margins in each if stable else ():
                 found.append(margins)
@@ -261,18 +260,13 @@ def _output(loop: Linearised, i: int) -> str:
 
 
 def _lifted_margins(
-    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, peak: float, late: Late,
-    system: System,
-) -> LoopMargins:  # fmt: skip
+    loop: Linearised, i: int, frequencies: Floats, peak: float, late: Late, system: System
+) -> LoopMargins:
     """The margins of a command at all of its samples in a period."""
     output = _output(loop, i)
     turn, crossover = phase_margin(loop, i) or (None, None)
     factors = tuple(GainMargin(factor=factor, frequency=at) for factor, at in gain_margins(loop, i))
-    crossings = np.flatnonzero(np.diff(np.sign(np.abs(gain) - 1.0)))
-    crossovers = [crossover_at(float(frequencies[place]), complex(gain[place])) for place in crossings]
-    if turn is not None and crossover:
-        crossovers.append((crossover, turn % (2.0 * math.pi) / crossover))
-    delay, why = _delay_margin(loop, i, crossovers, late)
+    delay, why = _delay_margin(loop, i, frequencies, late)
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
@@ -295,7 +289,7 @@ def _margins(loop: Linearised, i: int, frequencies: Floats, gain: Complexes, lat
     crossings = [root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in sign_changes(frequencies, np.abs(gain) - 1.0)]
     phases = {w: _phase_margin(gain_at(w)) for w in crossings}
     crossover = min(phases, key=lambda w: abs(phases[w]), default=None)
-    delay, why = _delay_margin(loop, i, [crossover_at(w, gain_at(w)) for w in crossings], late)
+    delay, why = _delay_margin(loop, i, frequencies, late)
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
@@ -309,10 +303,11 @@ def _margins(loop: Linearised, i: int, frequencies: Floats, gain: Complexes, lat
     )
 
 
-def _delay_margin(loop: Linearised, i: int, crossovers: Sequence[Crossover], late: Late) -> tuple[float | None, str]:
+def _delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> tuple[float | None, str]:
     """The delay margin, and why it is not known."""
+    half = math.pi / loop.rest.dt  # the rest are those of other samples
     try:
-        return delay_margin(loop, i, crossovers, late), ""
+        return delay_margin(loop, i, np.append(frequencies[frequencies < half], half), late), ""
     except UsageError as error:
         return None, str(error)
 

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability.linearise import NEAR_ONE, Linearised
-from orchestration.theory.stability.loop_halves import closed, radius
+from orchestration.theory.stability.loop_halves import closed, places, radius, sensitivity_of
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.sign_changes import root
 
@@ -21,25 +21,18 @@ TURNS = np.linspace(0.0, math.pi, 361)[1:]
 """Turns of the phase of a command that are tried [rad]"""
 
 
-def lifted_gains(loop: Linearised, i: int, frequencies: Floats, added: Complexes) -> tuple[Complexes, float]:
+def lifted_gains(loop: Linearised, i: int, frequencies: Floats) -> tuple[Complexes, float]:
     """The gain of the loop of a command at each frequency, shape (n,), and the largest gain of its sensitivity.
 
-    That is by the norm of a signal over all samples. Both follow from `added`, the `sensitivities` at the frequencies:
-    beside whole turns in a period rounding would decide on what the halves have, by poles of 1, as of a position.
+    That is by the norm of a signal over all samples. Both follow from the closed loop: beside whole turns in a period
+    rounding would decide on what the halves have, by poles of 1, as of a position.
     """
-    own = places(loop, i)
-    sensitivity = added[:, own][:, :, own]
+    sensitivity = sensitivity_of(loop, i, frequencies)
     values, vectors = np.linalg.eig(sensitivity)
     harmonic = np.exp(-1j * np.outer(frequencies * loop.dt, np.arange(loop.samples)))
     chosen = np.abs(np.einsum("nj,njk->nk", harmonic, vectors)).argmax(axis=1)
     of_chosen = np.take_along_axis(values, chosen[:, None], axis=1)[:, 0]
     return np.asarray(1.0 / of_chosen - 1.0, dtype=complex), float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
-
-
-def places(loop: Linearised, i: int) -> Integers:
-    """The places of a command at its samples, among those of all."""
-    count = len(loop.component.outputs) // loop.samples
-    return i + count * np.arange(loop.samples)
 
 
 def gain_margins(loop: Linearised, i: int) -> list[tuple[float, float]]:

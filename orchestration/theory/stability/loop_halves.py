@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.theory.stability.linearise import Linearised
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
@@ -55,11 +55,18 @@ def response(of: StateSpace, z: Complexes) -> Complexes:
     return np.asarray(of.C @ states + of.D, dtype=complex)
 
 
-def sensitivities(loop: Linearised, frequencies: Floats) -> Complexes:
-    """All commands by what is added to each, with the loop closed, shape (n, commands, commands)."""
-    z, whole = np.exp(1j * frequencies * loop.rest.dt), closed(loop)
-    states = np.linalg.solve(z[:, None, None] * np.eye(len(whole.A)) - whole.A, whole.steps.astype(complex)[None])
-    return np.asarray(np.eye(len(whole.direct)) + whole.direct + whole.commands @ states)
+def places(loop: Linearised, i: int) -> Integers:
+    """The places of a command at its samples, among those of all."""
+    count = len(loop.component.outputs) // loop.samples
+    return i + count * np.arange(loop.samples)
+
+
+def sensitivity_of(loop: Linearised, i: int, frequencies: Floats) -> Complexes:
+    """A command by what is added to it, both at all of its samples, the loop closed, shape (n, samples, samples)."""
+    z, whole, own = np.exp(1j * frequencies * loop.rest.dt), closed(loop), places(loop, i)
+    added = whole.steps[:, own].astype(complex)
+    states = np.linalg.solve(z[:, None, None] * np.eye(len(whole.A)) - whole.A, added[None])
+    return np.asarray(np.eye(len(own)) + whole.direct[np.ix_(own, own)] + whole.commands[own] @ states)
 
 
 def loop_gains(

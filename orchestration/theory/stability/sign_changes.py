@@ -32,21 +32,30 @@ def root(of: Callable[[float], float], low: float, high: float) -> float:
 
 
 def zero_between(
-    of: Callable[[float], float], short: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]
+    of: Callable[[float], float],
+    short: Callable[[float], float],
+    low: tuple[float, float],
+    high: tuple[float, float],
+    zero: float = ZERO,
 ) -> tuple[float, float]:
-    """Where a function passes 0 between two points (x, y) with y of opposite signs: by secants and halves.
+    """Where a function passes 0 between two points (x, y) with y of opposite signs: by secants, later by halves.
 
-    Two x: that of y below 0, then that above. They are one where the function is 0, and neighbours where it jumps.
+    A point that stays counts half the next time (the Illinois rule). Two x: that of y below 0, then that above. They
+    are one where the function is 0, and neighbours where it jumps.
     """
+    stays = False
     for trial in range(TRIALS):
         (a, below), (b, above) = low, high
         secant, half = short(a - below * (b - a) / (above - below)), short(0.5 * (a + b))
-        middle = half if trial % 3 == 2 or trial > SECANTS or secant in (a, b) else secant
+        middle = half if trial > SECANTS or secant in (a, b) else secant
         if middle in (a, b):
             break
         value = of(middle)
-        if abs(value) < ZERO:
+        if abs(value) < zero:
             return middle, middle
-        low, high = ((middle, value), high) if (value < 0.0) == (below < 0.0) else (low, (middle, value))
+        is_low = (value < 0.0) == (below < 0.0)
+        share = 0.5 if trial and is_low == stays else 1.0
+        low, high = ((middle, value), (b, share * above)) if is_low else ((a, share * below), (middle, value))
+        stays = is_low
     inside, outside = sorted((low, high), key=lambda point: point[1])
     return inside[0], outside[0]

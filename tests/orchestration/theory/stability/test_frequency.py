@@ -12,13 +12,12 @@ import pytest
 
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.theory.stability import delay_margin as delay_margin_module
 from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
-from orchestration.theory.stability.delay_margin import Late, jumps_of
+from orchestration.theory.stability.delay_margin import Late, LateCommand, delay_margin, jumps_of
 from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
 from orchestration.theory.stability.lifted_margins import lifted_gains
-from orchestration.theory.stability.loop_halves import closed, loop_gains, sensitivities
+from orchestration.theory.stability.loop_halves import closed, loop_gains
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import example
@@ -136,23 +135,18 @@ def test_a_delay_to_a_sampled_receiver_acts_where_a_message_misses_its_sample(pe
 def test_a_loop_that_is_unstable_for_a_while_between_two_jumps_has_the_margin_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A stub of a loop, which is unstable with delays of 11 to 12 ms, between the quarters of its samples."""
+    """A stub of growth, with delays of 11 to 12 ms, between the parts of samples."""
     one = system_of("dc_servo")
     servo = dataclasses.replace(one.components["servo"], step=None, sampling=Sampling(period=0.01, offset=0.003))
     other = dataclasses.replace(one.components["controller"], sampling=Sampling(period=0.02))
     jumps = jumps_of(dataclasses.replace(one, components={"controller": other, "servo": servo}), "controller")
     assert jumps == (0.001, 0.011)
-    monkeypatch.setattr(delay_margin_module, "_with", lambda loop, i, rest: rest)
-    monkeypatch.setattr(
-        delay_margin_module,
-        "_with_samples",
-        lambda part, i, whole: whole * 0.02 + (part if isinstance(part, float) else 0),
-    )
-    monkeypatch.setattr(delay_margin_module, "radius", lambda delay: 1.1 if 0.011 < delay < 0.012 else 0.9)
-    loop = dataclasses.replace(linearise(one), samples=2, radius=0.9)
+    monkeypatch.setattr(LateCommand, "ends_stability", lambda command, part: True)
+    monkeypatch.setattr(LateCommand, "tolerated", lambda command, delay: 0.01)
+    monkeypatch.setattr(LateCommand, "growth", lambda command, delay: 1.0 if 0.011 < delay < 0.012 else -1.0)
+    loop = dataclasses.replace(linearise(one), samples=2)
     loop = dataclasses.replace(loop, rest=dataclasses.replace(loop.rest, dt=0.04))
-    late = Late(rest=lambda part: cast(Any, part), jumps=jumps)
-    assert delay_margin_module.delay_margin(loop, 0, [(1.0, 0.02)], late) == 0.011
+    assert delay_margin(loop, 0, np.zeros(0), Late(rest=lambda part: cast(Any, part), jumps=jumps)) == 0.011
 
 
 def test_components_in_continuous_time_that_exchange_at_their_steps_are_named() -> None:
@@ -230,7 +224,7 @@ def test_beside_whole_turns_in_a_period_of_five_samples_gains_and_sensitivity_ar
 
     turn = 2.0 * np.pi / (samples * dt)
     beside = turn * np.array([1.0 - 1e-4, 1.0 + 1e-4, 1.0 + 1e-3, 2.0 + 1e-4])
-    found, peak = lifted_gains(loop, 0, beside, sensitivities(loop, beside))
+    found, peak = lifted_gains(loop, 0, beside)
     assert found == pytest.approx(gain(beside), rel=1e-9)
     everywhere = np.add.outer(beside, turn * np.arange(samples)).ravel()
     assert peak == pytest.approx(np.abs(1.0 / (1.0 + gain(everywhere))).max(), rel=1e-9)
