@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +16,7 @@ from orchestration.components.fmi.read_description import Model, called, declare
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
 from orchestration.simulation.engines.resolved import table_of
 from orchestration.systems.signals.table_file import TIME, header_of, read_rows
-from orchestration.systems.system.component import Component, Parameter
+from orchestration.systems.system.component import Component, Parameter, Sampling
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import component_names, experiment
@@ -47,7 +48,8 @@ def alone(
     `interval` [s] is that of the communication points, `inputs` a CSV file with a column for each input that it feeds,
     whose first and last row hold before and after; where one jumps, the FMU has a communication point, unless it takes
     steps of one length only. `start_time` and `stop_time` are times of the FMU; the run begins
-    at 0. Raises `UsageError` for a file that is no FMU.
+    at 0. Periodic clocks tick, and the rows are those of the ticks of the fastest; one that states no interval has
+    `interval`. Raises `UsageError` for a file that is no FMU, or that only a system can run.
     """
     model = read_model(path)
     with prefixed(f"{path}: "):
@@ -61,12 +63,14 @@ def alone(
     if stop_time is None and not model.varies_step and end > step:
         end = step * math.floor(end / step + 1e-9)  # as fmpy: no shorter step at the end
     name = component_names([model])[0]
-    _expect_no_ticks(model, name)
+    clock = _clock(model, name, record, interval)
     sources = {} if inputs is None else _sources(model, name, inputs, begin)
+    has_points = clock is None and model.varies_step
     component = Component(
         fmu=str(path),
-        step=step,
-        points=tuple(sorted({time for time, _ in _jumps(sources, end)})) if model.varies_step else (),
+        step=step if clock is None else None,
+        points=tuple(sorted({time for time, _ in _jumps(sources, end)})) if has_points else (),
+        sampling=clock,
         tolerance=tolerance,
         record=_recorded(model, record),
         parameters=dict(parameters or {}),
@@ -105,6 +109,8 @@ def remarks(system: System, *, is_default_end: bool) -> Iterator[str]:
 def late_jump(system: System) -> str | None:
     """The warning about inputs that jump between communication points: the first jump, and the step that has all."""
     (component,) = system.components.values()
+    if component.step is None:
+        return None  # inputs are set at ticks
     begin, step = Fraction(repr(component.start_time or 0.0)), Fraction(repr(component.step))
     jumps = _jumps(system.sources, system.stop_time)
     late = [(Fraction(repr(time)), name) for time, name in jumps if time not in component.points]
@@ -136,25 +142,43 @@ def _common(one: Fraction, other: Fraction) -> Fraction:
     return Fraction(math.gcd(int(one * denominator), int(other * denominator)), denominator)
 
 
-def _expect_no_ticks(model: Model, name: str) -> None:
-    """Raise `UsageError`, with the system that makes it run, for an FMU with clocks that tick: it needs samples."""
+def _clock(model: Model, name: str, record: Sequence[str], interval: float | None) -> Sampling | None:
+    """The ticks of the fastest clock of an FMU; None: it has none that ticks.
+
+    Raises `UsageError`, with the lines of the system that makes it run, for one whose variables or clocks need more.
+    """
     if model.interface == SCHEDULED:
-        return
-    ticks = bool(model.ticking)
-    try:
-        model.expect_clocks_that_tick()
-    except UsageError:
-        if "event-mode" not in declared_of(model.description):
-            raise
-        ticks = True
-    if ticks:
-        clock = min(model.clocks, key=lambda each: each.interval or math.inf)
-        period = "" if clock.interval is not None else ", period = SECONDS"
+        clocks = [clock.name for clock in model.clocks]
         raise UsageError(
-            f"{model.path}: has clocks, which tick at samples, of a system only; expected run FILE.toml, with these "
-            f'lines in the file: [components.{name}], fmu = "{model.path.name}", sampling = {{ fmu_clock = '
-            f'"{clock.name}"{period} }}; inputs from a CSV file: [sources.inputs], file, to = ["{name}.INPUT"]'
+            f"{model.path}: is for scheduled execution, in which each of its clocks has a partition; expected run "
+            f"FILE.toml, with a component for each of {', '.join(clocks)}, as in: [components.{clocks[0]}], fmu = "
+            f'"{model.path.name}", partition = "{clocks[0]}", sampling = {{ period = SECONDS }}'
         )
+    if not model.ticking:
+        try:
+            model.expect_clocks_that_tick()
+        except UsageError:
+            if model.access.interface is not None or "event-mode" not in declared_of(model.description):
+                raise
+            model = called(model, replace(model.access, interface="event-mode"))
+    if not model.ticking:
+        return None
+    clock, written = model.ticking[0], set(record or outputs(model))
+    between = [v.name for v in model.description.modelVariables if v.name in written and not v.clocks]
+    if between or (clock.interval is None and interval is None):
+        stated = "" if clock.interval is not None else ", period = SECONDS"
+        ticked = [v.name for v in model.description.modelVariables if v.clocks and v.causality == "output"]
+        what, needed = f"its clock {clock.name} states no interval", "--output-interval SECONDS"
+        if between:
+            what = f"{listed(between)} may change between the ticks of its clocks, the times of all rows"
+            needed = f"--record of outputs that do not, {listed(ticked)}"
+        raise UsageError(
+            f"{model.path}: {what}; expected {needed}, or run FILE.toml, with these lines in the file: "
+            f'[components.{name}], fmu = "{model.path.name}", sampling = {{ fmu_clock = "{clock.name}"{stated} }}; '
+            f'inputs from a CSV file: [sources.inputs], file, to = ["{name}.INPUT"]'
+        )
+    period = float(clock.interval or 0) if interval is None else interval
+    return Sampling(period=period, offset=float(clock.shift), fmu_clock=clock.name)
 
 
 def _time(model: Model, key: str) -> float | None:

@@ -13,7 +13,7 @@ from orchestration.simulation.requests.one_fmu import remarks
 from orchestration.simulation.requests.request import load_request
 from quadcosim import UsageError, run
 from tests.commands import Main
-from tests.orchestration.components.fmi.exchange import exchange, law
+from tests.orchestration.components.fmi.exchange import clock, exchange, law, partitions
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 
 JUMPING = """"time","thrust","torque.x"
@@ -92,11 +92,21 @@ def test_all_commands_set_what_run_sets_and_a_value_that_cannot_be_read_is_named
 
 
 @needs_compiler
-def test_of_an_fmu_whose_clocks_tick_at_samples_the_lines_of_its_system_are_said(main: Main, here: Path) -> None:
-    clock = '<Clock name="fast" valueReference="30" causality="input" intervalVariability="constant" {}/>'
-    refused = main("run", law(here, clock.format('intervalDecimal="0.1"')), code=2).stderr
-    assert "expected run FILE.toml, with these lines in the file: [components.Law], fmu = " in refused
+def test_periodic_clocks_tick_and_what_may_change_between_ticks_needs_a_system(main: Main, here: Path) -> None:
+    inputs, out, fmu = here / "in.csv", here / "out.csv", law(here, clock("fast"))
+    inputs.write_text("time,u,w\n0,1,0\n1,3,0\n1,5,0\n2,7,0\n")
+    main("run", fmu, "--in-process", "--inputs", inputs, "--record", "y", "--output", out, "--stop-time", "2")
+    assert out.read_text().split() == ['"time","y"', "0.0,-1.0", "0.5,-1.0", "1.0,-5.0", "1.5,-5.0", "2.0,-5.0"]
+    refused = main("run", fmu, code=2).stderr
+    assert "law.fmu: period, misused, ticks, slow_ticks may change between the ticks of its clocks" in refused
+    assert "expected --record of outputs that do not, y, or run FILE.toml, with these lines in the file: " in refused
     assert 'sampling = { fmu_clock = "fast" }; inputs from a CSV file: [sources.inputs]' in refused
+    fmu = law(here, clock("fast", "fixed", ""))
+    assert "its clock fast states no interval; expected --output-in" in main("run", fmu, "--record", "y", code=2).stderr
+    main("run", fmu, "--in-process", "--record", "y", "--output-interval", "0.25", "--output", out)
+    assert len(out.read_text().split()) == 6
+    refused = main("run", partitions(here), code=2).stderr
+    assert 'a component for each of inClock1, inClock2, inClock3, as in: [components.inClock1], fmu = "clo' in refused
 
 
 def numbers(rows: list[str]) -> list[float]:
