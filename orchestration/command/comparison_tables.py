@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from orchestration.command.printed_tables import PrintedTable
+from orchestration.command.printed_tables import PrintedTable, decimals_of, with_interval
 from orchestration.experiments.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.limits import GridLimit
@@ -72,17 +72,18 @@ def share_text(share: Share) -> str:
     return f"{share.value:.3f} [{share.low:.3f}, {share.high:.3f}]"
 
 
-def median_text(median: Median) -> str:
+def median_text(median: Median, digits: int = 4) -> str:
     """A median with its interval; a dash where no run has the value, no interval where too few have."""
     if median.value is None:
         return "-"
-    if median.low is None and median.high is None:
-        return f"{median.value:.4g}"
-    low, high = ("?" if end is None else f"{end:.4g}" for end in (median.low, median.high))
-    return f"{median.value:.4g} [{low}, {high}]"
+    value, low, high = (
+        "?" if end is None else f"{float(f'{end:.{digits}g}'):g}" for end in (median.value, median.low, median.high)
+    )
+    return value if median.low is None and median.high is None else f"{value} [{low}, {high}]"
 
 
-_UNITS = {"settling_time": "s", "residual": "m"}
+_UNITS = {"settling_time": ("s", 1.0), "residual": ("mm", 1e3)}
+"""Units of medians, and the factors by which those in the store are multiplied"""
 
 
 def comparison_table(comparison: Comparison, outcome: Outcome) -> PrintedTable:
@@ -124,11 +125,20 @@ def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> dict[str, 
         quantity, values = quantity_of(axis, {}), [cell.values[axis.name] for cell in cells]
         columns[quantity.title] = [f"{quantity.factor * v:g}" if is_number(v) else str(v) for v in values]
     columns |= {
-        "survives": [share_text(cell.survives) for cell in cells],
-        "settles": [share_text(cell.settles) for cell in cells],
+        "survives": [_share(cell.survives, cell.count) for cell in cells],
+        "settles": [_share(cell.settles, cell.count) for cell in cells],
         **{
-            f"median {name.replace('_', ' ')} [{unit}]": [median_text(c.medians[name]) for c in cells]
-            for name, unit in _UNITS.items()
+            f"median {name.replace('_', ' ')} [{unit}]": [_median(c.medians[name], factor) for c in cells]
+            for name, (unit, factor) in _UNITS.items()
         },
     }
     return columns
+
+
+def _share(share: Share, count: int) -> str:
+    return with_interval(share.value, share.low, share.high, decimals_of(count))
+
+
+def _median(median: Median, factor: float) -> str:
+    ends = (None if end is None else factor * end for end in (median.value, median.low, median.high))
+    return median_text(Median(**dict(zip(("value", "low", "high"), ends))), digits=3)

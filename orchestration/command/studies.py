@@ -1,6 +1,5 @@
 """The commands that run, export and draw studies."""
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +8,7 @@ import typer
 from orchestration.command import exact, printed_tables
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
-from orchestration.command.printed_tables import TABLE, PrintedTable
+from orchestration.command.printed_tables import TABLE, PrintedTable, decimals_of, with_interval
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import STORE, Dask, Out, StudyEngineFlag, TimeLimit, Workers
 from orchestration.experiments.studies.axis_labels import name_of, quantity_of
@@ -199,24 +198,25 @@ def study_table(study: Study, store: Path) -> PrintedTable:
     others = [axis for axis in study.cell_axes if laws is None or axis.name != laws.axis]
     word, units = study.origin.criterion.outcomes[0], units_in(store)
     quantities = {axis.name: quantity_of(axis, units) for axis in others}
+    decimals = decimals_of(shares["count"].max())
     first = shares if laws is None else shares[shares[laws.axis] == laws.first]
     columns = {
         name_of(axis) if not all(map(is_number, first[axis.name])) else quantities[axis.name].title: [
-            f"{quantities[axis.name].factor * value:g}" if is_number(value) else str(value)
+            f"{quantities[axis.name].factor * value:g}" if is_number(value) else _short(str(value))
             for value in first[axis.name]
         ]
         for axis in others
     }
     caption = f"Share of {word} runs of {shares['count'].max()} in each cell, with 95 % Wilson intervals"
     if laws is None:
-        columns[f"share {word}"] = _texts(shares, "share")
+        columns[f"share {word}"] = _texts(shares, "share", decimals)
     else:
         second = shares[shares[laws.axis] == laws.second]
         by = [axis.name for axis in others]
         for law, group in ((laws.first, first), (laws.second, second)):
-            columns[_short(law)] = _texts(first[by].merge(group, how="left", on=by), "share")
+            columns[_short(law)] = _texts(first[by].merge(group, how="left", on=by), "share", decimals)
         found = first[by].merge(differences_of(rows, names, laws), how="left", on=by)
-        columns["difference"] = _texts(found, "difference")
+        columns["difference"] = _texts(found, "difference", decimals)
         minus = f"{_short(laws.second)} minus {_short(laws.first)}"
         caption += f"; difference: {minus}, with 95 % intervals by Newcombe's method for pairs"
     if shares["low"].isna().any():
@@ -229,15 +229,6 @@ def _short(law: str) -> str:
     return law.rpartition("/")[2]
 
 
-def _texts(table: "pd.DataFrame", column: str) -> list[str]:
+def _texts(table: "pd.DataFrame", column: str, decimals: int) -> list[str]:
     """Values with their intervals, as far as they have one; a dash for a missing cell."""
-    texts = []
-    for value, low, high in zip(table[column], table["low"], table["high"]):
-        interval = "" if math.isnan(low) else f" [{_signed(low)}, {_signed(high)}]"
-        texts.append("-" if math.isnan(value) else f"{_signed(value)}{interval}")
-    return texts
-
-
-def _signed(value: float) -> str:
-    """A number with two decimals, or as many as show that it is not 0."""
-    return f"{value:.2f}" if abs(value) >= 0.005 else f"{value:.1g}" if abs(value) > 1e-9 else "0.00"
+    return [with_interval(*row, decimals) for row in zip(table[column], table["low"], table["high"])]

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 import quadcosim
 from orchestration.command import studies
-from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, lines
+from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, decimals_of, lines, with_interval
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
@@ -255,7 +255,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     table = done.stdout.splitlines()
     assert table[0] == r"\begin{table}  % needs \usepackage{booktabs}"
     assert r"of 2 in each cell, with 95 \% Wilson intervals; difference: CascadedController minus" in table[2]
-    assert table[5] == r"period [ms] & UnifiedController & CascadedController & difference \\"
+    assert table[5] == r"\shortstack[l]{{period} \\ {[ms]}} & UnifiedController & CascadedController & difference \\"
     assert table[7] == r"10 & 0.00 & 0.00 & 0.00 \\"
     with closing(sqlite3.connect(tmp_path / STORE)) as store, store:
         store.execute("DELETE FROM runs WHERE key = (SELECT key FROM design WHERE design_index = 7)")
@@ -271,7 +271,8 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
 
 def test_a_small_end_of_an_interval_keeps_its_sign() -> None:
     ends = pd.DataFrame({"share": [0.1, -1e-17], "low": [-0.0041, 0.0], "high": [0.256, 0.3]})
-    assert studies._texts(ends, "share") == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
+    assert studies._texts(ends, "share", 2) == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
+    assert with_interval(299 / 300, 0.98, 1.0, decimals_of(300)) == "0.997 [0.980, 1.000]"
 
 
 def test_a_printed_table_has_nothing_that_tex_reads_otherwise() -> None:
@@ -280,9 +281,20 @@ def test_a_printed_table_has_nothing_that_tex_reads_otherwise() -> None:
     )
     text = "\n".join(lines(table, "latex"))
     assert r"\caption{50 \% of law\_a}" in text
-    assert r"law\_a \& b & share \\" in text
+    assert r"\shortstack[l]{{law\_a} \\ {\& b}} & share \\" in text
     assert r"\#1 & $-$0.4 [$-$1, 2] \\" in text
     assert [*lines(table, "markdown")][-2:] == ["", "50 % of law_a"]
+
+
+def test_a_long_name_of_several_rows_stands_above_them_instead_of_in_a_column() -> None:
+    rows = [[name, period, "0.50"] for name in ("unified law, tuned", "cascade") for period in ("10", "20")]
+    text = [*lines(PrintedTable(caption="", heads=["law", "period", "share"], rows=rows, numbers=[]), "latex")]
+    assert text[3:] == [
+        r"\begin{tabular}{ll}", r"\toprule", r"period & share \\", r"\midrule",
+        r"\multicolumn{2}{l}{unified law, tuned} \\", r"10 & 0.50 \\", r"20 & 0.50 \\", r"\midrule",
+        r"\multicolumn{2}{l}{cascade} \\", r"10 & 0.50 \\", r"20 & 0.50 \\",
+        r"\bottomrule", r"\end{tabular}", r"\end{table}",
+    ]  # fmt: skip
 
 
 def test_a_table_of_more_rows_than_a_page_has_is_continued_on_further_pages() -> None:
