@@ -154,7 +154,11 @@ def linearise(
 
     Poles are those of the closed loop, in the z-plane; frequency and damping are of log(z) / dt. With --json A, B, C
     and D of both, and the names of their inputs and outputs.
+
+    Of one FMU, for model exchange: A, B, C and D in continuous time about its start, with the poles of A.
     """
+    if scenario is not None and scenario.suffix.lower() == ".fmu":
+        return _of_plant(request_from(scenario, flags, timing))
     from orchestration.theory.stability.linearise import linearise as linearised_loop
 
     loop = linearised_loop(request_from(scenario, flags, timing), component)
@@ -175,6 +179,34 @@ def linearise(
             rows.append((place, f"{size:.4f}", f"{pole.frequency:.4g} rad/s", damped))
     lines += in_columns(rows, right=True) if loop.poles else ()
     return CommandResult(document=document, verdict=loop.verdict, lines=lines)
+
+
+def _of_plant(request: "Request") -> CommandResult:
+    """The matrices of one FMU about its start, as tables, and its poles."""
+    import numpy as np
+
+    from orchestration.theory.stability.plant_at_start import plant_at_start
+
+    plant = plant_at_start(request)
+    lines = list[str]()
+    for name, rows, columns in (
+        ("A", plant.states, plant.states),
+        ("B", plant.states, plant.inputs),
+        ("C", plant.outputs, plant.states),
+        ("D", plant.outputs, plant.inputs),
+    ):
+        if rows and columns:
+            entries = [[f"{entry:.6g}" for entry in row] for row in getattr(plant, name).tolist()]
+            table = [(name, *columns), *((row, *cells) for row, cells in zip(rows, entries))]
+            lines += ["", *in_columns(table, right=True)]
+    poles = np.linalg.eigvals(plant.A).astype(complex).tolist()
+    lines += ["", f"poles  {', '.join(f'{pole:.4g}' for pole in poles)}"] if poles else []
+    document = {
+        **{name: getattr(plant, name).tolist() for name in "ABCD"}, "states": plant.states, "inputs": plant.inputs,
+        "outputs": plant.outputs, "operating_point": plant.operating_point, "rates": plant.rates,
+        "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in poles],
+    }  # fmt: skip
+    return CommandResult(document=document, verdict=plant.verdict, lines=lines)
 
 
 def _matrices(system: "StateSpace") -> dict[str, object]:

@@ -263,6 +263,13 @@ class AdaptedInstance(StepsWithEnd):
         self._do("settle")
         return super().slopes(outputs, inputs)
 
+    def set_states(self, values: Floats) -> None:
+        """Put it at other continuous states, by model exchange, until it is stepped."""
+        self._do("settle")
+        count = len(values)
+        if count:
+            self._call("setContinuousStates", (ctypes.c_double * count)(*values.tolist()), count)
+
     def own_state(self) -> bytes:
         """What `adapter.c` knows beside the state of the FMU, which leaves event mode."""
         self._do("settle")

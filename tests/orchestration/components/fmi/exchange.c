@@ -99,10 +99,14 @@ static int enter(Model *m, int from, int to) {
     m->mode = to;
     return 0;
 }
-/* Of curves; count says how often. */
-static int differentiate(Model *m, uint32_t r, double seed, double *out) {
+/* Of curves and the integrator; count says how often. */
+static int differentiate(Model *m, const uint32_t *of, size_t n, uint32_t r, double seed, double *out) {
     m->count++;
-    *out = seed * (r == U ? 3 * m->v[P] * m->v[U] * m->v[U] : 2 * m->v[Q] * m->v[W]);
+    for (size_t i = 0; i < n; i++) {
+        if (m->kind == CURVE) out[i] = seed * (r == U ? 3 * m->v[P] * m->v[U] * m->v[U] : 2 * m->v[Q] * m->v[W]);
+        else if (of[i] == Y) out[i] = seed * (r == U ? m->v[P] : r == W ? m->v[Q] : r == X1);
+        else out[i] = seed * (of[i] == r || (of[i] == DX1 && r == X2) || (of[i] == DX2 && r == U));
+    }
     return m->mode == 2 || !m->mode ? 0 : 3;
 }
 static int indicate(Model *m, double *z, size_t n) {
@@ -161,7 +165,7 @@ int fmi3UpdateDiscreteStates(Model *m, bool *again, bool *ends, bool *nominals, 
 int fmi3GetDirectionalDerivative(
     Model *m, const uint32_t *of, size_t n, const uint32_t *by, size_t k, const double *seed, size_t s, double *out,
     size_t c) {
-    return differentiate(m, *by, *seed, out);
+    return differentiate(m, of, n, *by, *seed, out);
 }
 int fmi3SetTime(Model *m, double t) { m->v[T] = t; return 0; }
 int fmi3SetContinuousStates(Model *m, const double *x, size_t n) { memcpy(m->v + X1, x, n * 8); return 0; }
@@ -243,7 +247,7 @@ int fmi2NewDiscreteStates(Model *m, Info *info) {
 }
 int fmi2GetDirectionalDerivative(
     Model *m, const uint32_t *of, size_t n, const uint32_t *by, size_t k, const double *seed, double *out) {
-    return differentiate(m, *by, *seed, out);
+    return differentiate(m, of, n, *by, *seed, out);
 }
 int fmi2SetTime(Model *m, double t) { return fmi3SetTime(m, t); }
 int fmi2SetContinuousStates(Model *m, const double *x, size_t n) { return fmi3SetContinuousStates(m, x, n); }
