@@ -172,6 +172,15 @@ def test_a_missing_value_is_refused_by_its_name() -> None:
         Sampling()  # type: ignore[call-arg]
 
 
+def test_scenarios_and_systems_are_keys_whatever_the_order_of_their_parameters() -> None:
+    one, other = (
+        quadcosim.Scenario().with_changes(plant=dict(sorted({"mass": 1.2, "drag": 0.1}.items(), reverse=turned)))
+        for turned in (False, True)
+    )
+    assert {one: 1, quadcosim.Scenario(): 2} == {other: 1, quadcosim.Scenario(seed=0): 2}
+    assert len({one.as_system(), other.as_system(), quadcosim.Scenario().as_system()}) == 2
+
+
 def test_lists_paths_and_numbers_of_numpy_are_taken_as_they_are_meant() -> None:
     source = Source(to=["a.u"], file="table.csv")  # type: ignore[arg-type]
     assert (source.to, source.file) == (("a.u",), Path("table.csv"))

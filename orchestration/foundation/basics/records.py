@@ -52,7 +52,7 @@ def record(place: str = "") -> Callable[[Class], Class]:
 
     Missing, unknown and mistyped fields are named after their `place`. A list is accepted for a tuple, text for a path
     and a path for text, and a NumPy number for one of Python's. Its `repr` shows the fields that differ from their
-    defaults.
+    defaults. It may be a key of a dictionary, where its own dictionaries are not changed.
 
     Pydantic is loaded by the first value that does not fit as it is.
     """
@@ -62,6 +62,7 @@ def record(place: str = "") -> Callable[[Class], Class]:
         record_class.__pydantic_config__ = _CONFIG
         if "__repr__" not in vars(cls):
             record_class.__repr__ = _short_repr
+        record_class.__hash__ = _hash_by(record_class.__hash__)
 
         @functools.wraps(record_class.__init__)
         def checked(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -161,6 +162,25 @@ def _short_repr(self: Any) -> str:
     defaults = {field.name: default_of(field) for field in dataclasses.fields(self)}
     changed = [f"{name}={_SHORTENED.repr(value)}" for name, value in values.items() if value != defaults[name]]
     return f"{type(self).__name__}({', '.join(changed)})"
+
+
+def _hash_by(usual: Callable[[Any], int]) -> Callable[[Any], int]:
+    """The hash of a record: the usual one of dataclasses, or where it has dictionaries, whose order does not count."""
+
+    def hash_of(self: Any) -> int:
+        try:
+            return usual(self)
+        except TypeError:
+            return hash(tuple(_hashable(getattr(self, field.name)) for field in dataclasses.fields(self)))
+
+    return hash_of
+
+
+def _hashable(value: Any) -> Any:
+    """A value, or one that is as equal and has a hash."""
+    if isinstance(value, Mapping):
+        return frozenset((key, _hashable(each)) for key, each in value.items())
+    return tuple(map(_hashable, value)) if isinstance(value, (list, tuple)) else value
 
 
 _SHORTENED = reprlib.Repr()
