@@ -119,7 +119,7 @@ def sweep_runs(period: float, runs: int) -> None:
     base = Scenario(timing=Timing(period=period), stop_time=20.0)
     study = Study(name="bench", base=base, axes=(axis,), method="random", samples=runs)
     with tempfile.TemporaryDirectory() as folder:
-        sweep(study, folder=Path(folder), engine="batch")
+        sweep(study, out=Path(folder), engine="batch")
 
 
 def from_arrays(period: float, runs: int) -> tuple[float, float]:

@@ -25,7 +25,7 @@ def runs_per_second(workers: int) -> float:
     study = Study(name="bench", base=Scenario(stop_time=SECONDS), axes=(axis,), method="random", samples=RUNS)
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        sweep(study, folder=Path(folder), workers=workers)
+        sweep(study, out=Path(folder), workers=workers)
         return RUNS / (time.perf_counter() - start)
 
 

@@ -66,7 +66,7 @@ def seconds(chosen: Study, engine: EngineChoice, dask: str | None) -> float:
     for _ in range(2):
         with tempfile.TemporaryDirectory() as folder:
             start = time.perf_counter()
-            sweep(chosen, folder=Path(folder), workers=1 if dask else WORKERS, dask=dask, engine=engine)
+            sweep(chosen, out=Path(folder), workers=1 if dask else WORKERS, dask=dask, engine=engine)
             found.append(time.perf_counter() - start)
     return min(found)
 

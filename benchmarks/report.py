@@ -46,7 +46,7 @@ def write_report(side: int, folder: Path) -> Path:
     file = folder / "study.toml"
     file.write_text(STUDY.format(side=side), encoding="utf-8")
     started = time.perf_counter()
-    summary = sweep(load_study(file), folder=folder, engine="batch")
+    summary = sweep(load_study(file), out=folder, engine="batch")
     swept = time.perf_counter()
     out = report(file, out=folder)
     print(f"{summary.total} runs in {swept - started:.1f} s, report written in {time.perf_counter() - swept:.1f} s")

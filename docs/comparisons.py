@@ -119,8 +119,8 @@ def read_data(name: str) -> Any:
 def run_missing(name: str) -> Any:
     """Run the missing flights of a comparison, and store its results."""
     began, comparison, steady = time.perf_counter(), load(name), on_path(load(name))
-    outcome = compare(comparison, folder=RESULTS / name, workers=WORKERS, engine="batch", figures=False)
-    pushed = sweep(steady.study, folder=RESULTS / steady.name, workers=WORKERS, engine="batch").to_pandas()[RESIDUAL]
+    outcome = compare(comparison, out=RESULTS / name, workers=WORKERS, engine="batch", figures=False)
+    pushed = sweep(steady.study, out=RESULTS / steady.name, workers=WORKERS, engine="batch").to_pandas()[RESIDUAL]
     found, table = as_json(comparison, outcome.outcome, outcome.bandwidths), outcome.table
     minutes = round((time.perf_counter() - began) / 60.0, 1)
     content = {

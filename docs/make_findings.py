@@ -377,7 +377,7 @@ def run_study_file(name: str) -> pd.DataFrame:
 
 def run_study(study: Study) -> pd.DataFrame:
     """The table of a study, after running the missing flights in lanes."""
-    return sweep(study, folder=RESULTS / study.name, workers=comparisons.WORKERS, engine="batch").to_pandas()
+    return sweep(study, out=RESULTS / study.name, workers=comparisons.WORKERS, engine="batch").to_pandas()
 
 
 def draw(name: str, metric: str) -> None:

@@ -63,7 +63,7 @@ def compare(
         return _cell(loaded, rerun, run.stored_cell(loaded, cell, out))
     style = look.figure_style if figures else None
     compared = run.compare(
-        loaded, folder=out, workers=workers, dask=dask, engine=how, time_limit=time_limit, figures=figures, style=style
+        loaded, out=out, workers=workers, dask=dask, engine=how, time_limit=time_limit, figures=figures, style=style
     )
     flags = (" --native" if native else "") + (f" --engine {engine}" if engine != "auto" else "")
     return _all_cells(loaded, compared, again=f"quadcosim compare {comparison}{flags} --cell K", table=table)

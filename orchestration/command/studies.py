@@ -49,7 +49,7 @@ def sweep(
     loaded = load_study(study)
     _warn_if_means_are_infinite(loaded)
     summary = run_missing(
-        loaded, folder=out, workers=workers, dask=dask, retry_failed=retry_failed,
+        loaded, out=out, workers=workers, dask=dask, retry_failed=retry_failed,
         engine=engine_choice(engine), time_limit=time_limit,
     )  # fmt: skip
     failed = f", {summary.failed} failed (quadcosim export shows why; --retry-failed)" if summary.failed else ""

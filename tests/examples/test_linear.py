@@ -115,7 +115,7 @@ def test_an_lqi_against_the_law_of_the_paper_has_the_same_shares_through_compare
     path = tmp_path / "lqi.toml"
     path.write_text(COMPARISON.format(folder=FOLDER))
     comparison = quadcosim.load_comparison(path)
-    cells = quadcosim.compare(comparison, folder=tmp_path, figures=False, progress=None, announce=None).outcome.cells
+    cells = quadcosim.compare(comparison, out=tmp_path, figures=False, progress=None, announce=None).outcome.cells
     plant, law = "native/QuadrotorPlant", str(FOLDER / "native" / "LinearFeedback.fmu")
     laws = {
         "unified": Scenario().with_fmus(plant=plant, controller="native/UnifiedController"),

@@ -150,7 +150,7 @@ def test_the_axis_of_a_study_has_names_for_values_and_so_has_its_table(maker: Pa
         'values = ["flat", "line", "two_lines"]\n',
         "utf-8",
     )
-    sweep(load_study(file), folder=tmp_path)
+    sweep(load_study(file), out=tmp_path)
     with open_for_reading(store_path("study", tmp_path)) as store:
         found = [(row["settings"]["shape"], row["made"]) for row in store.rows()]
     assert found == [("flat", 0.0), ("line", 1.0), ("two_lines", 2.0)]

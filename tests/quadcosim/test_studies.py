@@ -24,7 +24,7 @@ STUDY = Study(name="periods", base=native(stop_time=0.1), axes=(PERIODS,))
 
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> Swept:
-    return quadcosim.sweep(STUDY, folder=tmp_path_factory.mktemp("study"), progress=None)
+    return quadcosim.sweep(STUDY, out=tmp_path_factory.mktemp("study"), progress=None)
 
 
 def test_a_sweep_becomes_a_table_with_units_of_axes_and_metrics(swept: Swept) -> None:
@@ -38,9 +38,7 @@ def test_a_sweep_becomes_a_table_with_units_of_axes_and_metrics(swept: Swept) ->
 
 def test_a_sweep_is_not_flown_twice_and_tells_its_progress(swept: Swept) -> None:
     reported: list[tuple[int, int]] = []
-    again = quadcosim.sweep(
-        STUDY, folder=swept.path.parent, progress=lambda done, total: reported.append((done, total))
-    )
+    again = quadcosim.sweep(STUDY, out=swept.path.parent, progress=lambda done, total: reported.append((done, total)))
     assert (again.total, again.flown, reported) == (2, 0, [(2, 2)])
     assert repr(again) == f"<Swept: 2 runs, 0 of them new, in {again.path}>"
 
@@ -78,16 +76,16 @@ def test_functions_of_a_result_are_metrics_of_a_sweep_known_by_their_source(tmp_
         return None if len(result.events) > 22 else len(result.events)
 
     metrics = {"furthest": furthest, "nearest": nearest, "coarse": coarse}
-    found = quadcosim.sweep(STUDY, metrics=metrics, folder=tmp_path, progress=None)
+    found = quadcosim.sweep(STUDY, metrics=metrics, out=tmp_path, progress=None)
     table = found.to_pandas()
     assert (table["furthest"] >= table["nearest"]).all()
     alone = [quadcosim.run(native(stop_time=0.1, timing=Timing(period=period))) for period in (0.01, 0.02)]
     assert table["furthest"].tolist() == [furthest(result) for result in alone]
     assert table["coarse"].isna().tolist() == [True, False]
     assert list(found.plot("furthest")) == ["furthest"]
-    assert quadcosim.sweep(STUDY, metrics=metrics, folder=tmp_path, progress=None).flown == 0
+    assert quadcosim.sweep(STUDY, metrics=metrics, out=tmp_path, progress=None).flown == 0
     with pytest.raises(UsageError, match=r"holds another study \(metrics.nearest was .*\); expected the same one"):
-        quadcosim.sweep(STUDY, metrics={**metrics, "nearest": furthest}, folder=tmp_path, progress=None)
+        quadcosim.sweep(STUDY, metrics={**metrics, "nearest": furthest}, out=tmp_path, progress=None)
 
 
 def _uses_what_is_around(result):
@@ -132,7 +130,7 @@ def test_functions_and_lanes_do_not_go_together_and_an_error_in_one_is_that_of_i
         return result.signals["no.such"]
 
     lines: list[str] = []
-    quadcosim.sweep(STUDY, metrics={"broken": broken}, folder=tmp_path, progress=None, announce=lines.append)
+    quadcosim.sweep(STUDY, metrics={"broken": broken}, out=tmp_path, progress=None, announce=lines.append)
     failed = (
         "run 1 (timing.period = 0.02) failed: metrics.broken: UnknownNameError: there is no no.such; expected one of "
     )
@@ -174,7 +172,7 @@ from quadcosim import Axis, Scenario, Study
 base = Scenario(stop_time={stop}).with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
 study = Study(name="seeds", base=base, axes=(Axis(name="seed", values=tuple(range({runs}))),))
 say = lambda done, total: print("done", done, flush=True)
-quadcosim.sweep(study, folder={folder!r}, workers=2, engine="compiled", progress=say)
+quadcosim.sweep(study, out={folder!r}, workers=2, engine="compiled", progress=say)
 """
 
 
@@ -240,11 +238,11 @@ def test_what_cannot_be_is_refused_in_a_line_before_anything_is_flown(tmp_path: 
     with pytest.raises(UsageError, match=r"timing.perio: expected .*KEY one of period"):
         Study(name="x", base=Scenario(), axes=(Axis(name="timing.perio", values=(0.1,)),))
     folder: Any = 3
-    with pytest.raises(UsageError, match=r"^folder = 3: expected the path of a folder$"):
-        quadcosim.sweep({"name": "x", "base": Scenario(), "axes": [{"name": "seed", "values": [1]}]}, folder=folder)
+    with pytest.raises(UsageError, match=r"^out = 3: expected the path of a folder$"):
+        quadcosim.sweep({"name": "x", "base": Scenario(), "axes": [{"name": "seed", "values": [1]}]}, out=folder)
 
 
 def test_without_a_package_of_an_extra_one_line_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "filelock", None)
     with pytest.raises(QuadcosimError, match=r"^filelock is not installed; .*quadcosim\[studies\]'$"):
-        quadcosim.sweep(STUDY, folder=tmp_path, progress=None)
+        quadcosim.sweep(STUDY, out=tmp_path, progress=None)

@@ -141,7 +141,7 @@ class Compared:
 def compare(
     comparison: Comparison | FileLike,
     *,
-    folder: str | Path | None = None,
+    out: str | Path | None = None,
     workers: int = 1,
     dask: str | None = None,
     engine: EngineChoice = "auto",
@@ -155,12 +155,12 @@ def compare(
 
     `comparison` may be the path of its file, or the content of the file as a dictionary, as `load_comparison` takes
     them.
-    `folder`, `workers`, `dask`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises
+    `out`, `workers`, `dask`, `engine`, `time_limit`, `progress` and `announce` are those of `sweep`, which raises
     what this does. Pictures are drawn unless `figures` is false, in a `style`, by default for a screen.
     """
     comparison = load_comparison(comparison)
     summary = sweep(
-        comparison.study, folder=folder, workers=workers, dask=dask, engine=engine, time_limit=time_limit,
+        comparison.study, out=out, workers=workers, dask=dask, engine=engine, time_limit=time_limit,
         progress=progress, announce=announce,
     )  # fmt: skip
     comparison = replace(comparison, native=summary.study.native)

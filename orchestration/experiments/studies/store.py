@@ -30,7 +30,7 @@ def note_on_engines(engines: Mapping[str, int]) -> str | None:
 def store_path(study: str, folder: str | Path | None = None) -> Path:
     """The path of a study's store; default: `results/NAME/study.sqlite`. Raises `UsageError` for what is no path."""
     if not isinstance(folder, str | PathLike | None):
-        raise UsageError(f"folder = {shown(repr(folder))}: expected the path of a folder")
+        raise UsageError(f"out = {shown(repr(folder))}: expected the path of a folder")
     return Path(folder or Path("results") / study) / "study.sqlite"
 
 

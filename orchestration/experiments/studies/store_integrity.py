@@ -38,7 +38,7 @@ def expect_sound(path: Path, connection: sqlite3.Connection) -> list[str]:
         raise QuadcosimError(f"{path}: expected the store of a study; nothing has been written into it yet")
     if objectives is None or schema != tables_for(objectives):
         raise QuadcosimError(
-            f"{path}: no store of this version of quadcosim; expected one: take another --out, or remove it"
+            f"{path}: no store of this version of quadcosim; expected one: take another folder, --out, or remove it"
         )
     expect_no_damage(path, connection)
     expect_written(path, "about", connection.execute("SELECT * FROM about"))

@@ -64,7 +64,7 @@ def sweep(
     study: Study | FileLike,
     *,
     metrics: Mapping[str, Callable[[Result], float | None]] | None = None,
-    folder: str | Path | None = None,
+    out: str | Path | None = None,
     workers: int = 1,
     dask: str | None = None,
     retry_failed: bool = False,
@@ -80,7 +80,7 @@ def sweep(
     Their source is executed in other processes and identifies the run, so a function must contain everything that it
     uses, except modules. Such runs are executed one at a time.
 
-    The store is in `folder`, default `results/NAME`; runs in it are not repeated, so that a sweep may be stopped and
+    The store is in the folder `out`, default `results/NAME`; runs in it are not repeated, so a sweep may be stopped and
     called again. Runs are executed by `workers` processes of this machine, which need no guard of the main module and
     work from a notebook, or by those of the `dask` scheduler at this address. The engine `batch` runs native FMUs in
     SIMD lanes, and repeats some runs with the FMUs to compare; `auto` continues a store by the engine that it has, and
@@ -100,7 +100,7 @@ def sweep(
         study = replace(study, metrics=metrics_from_sources(metrics))
     columns, execution, follows = prepare(study, engine)
     study, files = columns.study, columns.files
-    path = store.store_path(study.name, folder)
+    path = store.store_path(study.name, out)
     with (
         runs_reporter(progress) as report,
         store.open_for_writing(path, study.metric_names) as opened,
@@ -109,7 +109,7 @@ def sweep(
         _expect_same_study(opened, columns)
         if engine == "auto":
             before = opened.about().get(ENGINE, execution.name)
-            execution = execution.as_before(before, str(path), "another one needs another --out")
+            execution = execution.as_before(before, str(path), "another one needs another folder, --out")
         all_files = with_python_twins(files) if execution.in_lanes else files
         reached = None if dask is None else stack.enter_context(cluster(Inputs.of(all_files), dask))
         _describe(opened, columns)  # last, so that what is refused changes nothing
@@ -299,7 +299,7 @@ def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
     before, place = ({key: part[key] for key in part.keys() - of_design} for part in (before, place))
     if changes := difference({**json.loads(about[STUDY_PARTS]), **before}, {**study_parts(study), **place}):
         raise UsageError(
-            f"{opened.path}: holds another study ({changes}); expected the same one: take another --out, "
+            f"{opened.path}: holds another study ({changes}); expected the same one: take another folder, --out, "
             "or remove the store"
         )
 

@@ -162,7 +162,7 @@ def set_wording(wording: Wording) -> None:
     _wording = wording
 
 
-_ARGUMENTS = {"from": "first", "to": "last", "out": "folder"}
+_ARGUMENTS = {"from": "first", "to": "last"}
 """Flags whose Python argument has another name"""
 _COMMAND_OR_FLAG = re.compile(r"quadcosim \S+(?: --[a-z-]+)+|(?<![\w-])--([a-z][a-z-]*)")
 _FLAG_VALUE = re.compile(r"--([a-z-]+) ([^\s,]*)(?: (?=--)|$)")

@@ -30,7 +30,7 @@ from orchestration.systems.system.request import system_of
 def run_until(
     request: RequestLike,
     pause_at: float,
-    folder: str | Path,
+    out: str | Path,
     *,
     figures: bool = True,
     progress: Progress | None = None,
@@ -41,9 +41,9 @@ def run_until(
     memory_limit: float = Limits.memory,
     pace: float | None = None,
 ) -> Result | None:
-    """Run to the first communication point from `pause_at` [s] on, and write the state into `folder`, a new one.
+    """Run to the first communication point from `pause_at` [s] on, and write the state into `out`, a new folder.
 
-    Returns None, or the result if the run ended before: its directory is then in `folder`. All other arguments are
+    Returns None, or the result if the run ended before: its directory is then in `out`. All other arguments are
     those of `run`.
     """
     loaded = request_of(request)
@@ -61,7 +61,7 @@ def run_until(
             recorder.finish()
         return result
 
-    return keep_run(folder, simulate_into, figures=figures, replaces=())
+    return keep_run(out, simulate_into, figures=figures, replaces=())
 
 
 def _until(pause_at: float, folder: Path, simulation: PreparedRun, progress: Progress | None) -> bool:

@@ -102,15 +102,15 @@ STATE = "paused.npz"
 """File of a run that has been paused"""
 
 
-def save_run(result: Result, folder: str | Path, *, figures: bool = True) -> Path:
+def save_run(result: Result, out: str | Path, *, figures: bool = True) -> Path:
     """Write the directory of a run, replacing an earlier run there; returns it.
 
-    Raises `UsageError` if `folder` holds something else.
+    Raises `UsageError` if `out` holds something else.
     """
-    with run_folder(Path(folder), (METRICS,)) as new:
+    with run_folder(Path(out), (METRICS,)) as new:
         tables.copy(result.recording, new.path, result.about)
         _write(result, new.path, figures=figures)
-    return Path(folder)
+    return Path(out)
 
 
 def _write(result: Result, folder: Path, *, figures: bool) -> None:

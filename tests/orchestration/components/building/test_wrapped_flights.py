@@ -252,8 +252,8 @@ sets = ["components.controller.parameters.k_p"]
 values = [0.5, 1.0, 1.5]
 """)
     study = load_study(folder / "study.toml")
-    lanes = sweep(study, folder=folder / "lanes", engine="batch")
-    singly = sweep(study, folder=folder / "singly", engine="compiled")
+    lanes = sweep(study, out=folder / "lanes", engine="batch")
+    singly = sweep(study, out=folder / "singly", engine="compiled")
     assert (lanes.engine, singly.engine, lanes.failed) == ("batch", "compiled", 0)
     assert bits(lanes.path) == bits(singly.path)
 

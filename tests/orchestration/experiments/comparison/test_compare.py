@@ -119,7 +119,7 @@ def test_nothing_is_run_twice_and_the_result_stays(table: str, folder: Path, mai
 
 def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
     native = replace(quadcosim.load_comparison(folder / "small.toml"), native=True)
-    found = quadcosim.compare(native, folder=folder / "out", figures=False, progress=None, announce=None)
+    found = quadcosim.compare(native, out=folder / "out", figures=False, progress=None, announce=None)
     assert found.summary.flown == 0
     assert found.verdict.startswith("from half of the starts, over period: coupled survives ")
     with pytest.raises(UsageError, match=r"what = 'fronts': .*expected one of cells, limits, pairs, runs"):

@@ -107,7 +107,7 @@ def of_study(show: Show, tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("study")
     name = "grid"
     study = Study(name=name, base=scenario(), axes=(axis("timing.period", 0.01, 0.2), axis("timing.delay", 0.0, 0.01)))
-    sweep(study, folder=folder)
+    sweep(study, out=folder)
     file = folder / "study.toml"
     fmus = f'[base.plant]\nfmu = "{NATIVE.plant.fmu}"\n[base.controller]\nfmu = "{NATIVE.controller.fmu}"\n'
     axes = "".join(
@@ -144,7 +144,7 @@ count = 3
 ''',
         encoding="utf-8",
     )
-    compare(load_comparison(file), folder=folder, figures=False, progress=None, announce=None)
+    compare(load_comparison(file), out=folder, figures=False, progress=None, announce=None)
     return show(report(file, out=folder, flights=4))
 
 
@@ -354,7 +354,7 @@ def test_an_axis_of_words_has_a_tick_for_each_and_its_cells_fill_the_map(show: S
         '[[axes]]\nname = "timing.order"\nvalues = ["gauss-seidel", "jacobi"]\n'
         '[[axes]]\nname = "plant.initial.position.z"\nvalues = [0.0, 2.0]\n'  # the second is good: there is an edge
     )
-    sweep(load_study(file), folder=tmp_path)
+    sweep(load_study(file), out=tmp_path)
     page = show(report(file, out=tmp_path, flights=1, runs=[0]))
     texts = page.locator("#map-plot text").all_text_contents()
     assert {"gauss-seidel", "jacobi"} <= {*texts}
@@ -372,7 +372,7 @@ def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_see
         '[[axes]]\nname = "timing.period"\nvalues = [0.01, 0.02]\n'
         '[[axes]]\nname = "timing.loss"\nvalues = [0.0, 0.5]\n[[axes]]\nname = "seed"\nvalues = [1, 2]\n'
     )
-    sweep(load_study(file), folder=tmp_path)
+    sweep(load_study(file), out=tmp_path)
     page = show(report(file, out=tmp_path, flights=16))
     chosen = page.locator("#map-controls select")
     opened = chosen.evaluate("select => select.selectedOptions[0].textContent")

@@ -103,7 +103,7 @@ def sweep(chosen: Study, **options: Any) -> Swept:
 
 def swept(chosen: Study, folder: Path, **options: Any) -> Path:
     """The store of a study after its sweep."""
-    return sweep(chosen, folder=folder, **options).path
+    return sweep(chosen, out=folder, **options).path
 
 
 def starts() -> dict[str, dict[str, float]]:

@@ -116,10 +116,10 @@ def test_runs_that_were_begun_without_lanes_are_continued_without(
 ) -> None:
     with monkeypatch.context() as broken:
         broken.setattr(shape, "preferred_lanes", no_compiler)
-        sweep(study(axis("timing.period", 0.01, 0.02)), folder=tmp_path, engine="auto")
+        sweep(study(axis("timing.period", 0.01, 0.02)), out=tmp_path, engine="auto")
     told: list[str] = []
     more = study(axis("timing.period", 0.01, 0.02, 0.03))
-    found = sweep(more, folder=tmp_path, engine="auto", announce=told.append)
+    found = sweep(more, out=tmp_path, engine="auto", announce=told.append)
     assert told == ["engine compiled: native FMUs, one run at a time (as the runs there)"]
     assert (found.engine, found.engines) == ("compiled", {"compiled": 3})
 
@@ -131,7 +131,7 @@ def test_a_sweep_in_lanes_has_the_same_bits_whichever_chunk_its_worker_dies_in(
 ) -> None:
     (tmp_path / "study.toml").write_text(NOISY)
     chosen = load_study(tmp_path / "study.toml")
-    whole = bits(sweep(chosen, folder=tmp_path / "whole", engine="batch").path)
+    whole = bits(sweep(chosen, out=tmp_path / "whole", engine="batch").path)
     request, requests = WorkerProcess.request, 0
 
     def killed(self: WorkerProcess, task: RunTask | TaskBatch) -> Any:
@@ -142,7 +142,7 @@ def test_a_sweep_in_lanes_has_the_same_bits_whichever_chunk_its_worker_dies_in(
         return request(self, task)
 
     monkeypatch.setattr(WorkerProcess, "request", killed)
-    found = sweep(chosen, folder=tmp_path / "killed", engine="batch")
+    found = sweep(chosen, out=tmp_path / "killed", engine="batch")
     assert requests > at
     assert found.engines == {"batch": RUNS}
     assert bits(found.path) == whole

@@ -397,7 +397,7 @@ def test_a_limit_over_times_is_in_milliseconds_where_all_are_below_a_second(long
 def test_the_axes_of_a_study_have_the_units_of_its_store(tmp_path: Path) -> None:
     inertia = Axis(name="inertia xx", targets=("plant.inertia.xx", "controller.inertia.xx"), values=(0.5, 1.0))
     chosen = study(inertia, axis("timing.period", 0.01, 0.02))
-    sweep(chosen, folder=tmp_path, progress=None, announce=None)
+    sweep(chosen, out=tmp_path, progress=None, announce=None)
     made, _ = study_figures(chosen, store_path(chosen.name, tmp_path), "position_rmse")
     lines, cells_drawn = made["position_rmse"], made["position_rmse_map"]
     assert (lines.axes[0].get_xlabel(), lines.legends[0].get_title().get_text()) == (

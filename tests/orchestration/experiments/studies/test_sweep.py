@@ -84,8 +84,7 @@ def test_a_row_has_the_metrics_of_a_direct_run(folder: Path, reference: list[dic
 def test_a_finished_study_is_not_run_again_and_progress_starts_at_the_existing_rows(tmp_path: Path) -> None:
     heard: list[tuple[int, int]] = []
     first, second = (
-        sweep(study(PERIODS), folder=tmp_path, progress=lambda done, total: heard.append((done, total)))
-        for _ in range(2)
+        sweep(study(PERIODS), out=tmp_path, progress=lambda done, total: heard.append((done, total))) for _ in range(2)
     )
     assert (first.total, first.flown, first.failed) == (2, 2, 0)
     assert (second.total, second.flown, second.failed) == (2, 0, 0)
@@ -118,7 +117,7 @@ CHANGES: list[tuple[Study, str]] = [
 def test_a_changed_study_is_refused_with_the_changes(finished: Path, changed: Study, said: str) -> None:
     before = bits(store_path("study", finished))
     with pytest.raises(UsageError, match=rf"holds another study \({said}") as caught:
-        sweep(changed, folder=finished)
+        sweep(changed, out=finished)
     assert "expected the same one: take another folder, or remove the store" in one_line(caught.value)
     assert bits(store_path("study", finished)) == before
 
@@ -144,19 +143,19 @@ def test_other_fmus_machines_and_sources_are_a_changed_study(
     else:
         monkeypatch.setattr("orchestration.experiments.studies.run_key.versions", lambda: edited)
     with pytest.raises(UsageError, match=said):
-        sweep(study(PERIODS), folder=finished)
+        sweep(study(PERIODS), out=finished)
 
 
 def test_another_fmu_at_the_path_of_an_axis_is_a_changed_study_and_a_further_path_is_none(tmp_path: Path) -> None:
     paths = [str(tmp_path / f"{name}.fmu") for name in "ab"]
     for path in paths:
         shutil.copy(locate(NATIVE.controller.fmu), path)
-    sweep(study(axis("controller.fmu", paths[0])), folder=tmp_path)
+    sweep(study(axis("controller.fmu", paths[0])), out=tmp_path)
     chosen = study(axis("controller.fmu", *paths))
-    assert sweep(chosen, folder=tmp_path).flown == 0  # by content the same run
+    assert sweep(chosen, out=tmp_path).flown == 0  # by content the same run
     shutil.copy(locate("native/GeometricController"), paths[1])
     with pytest.raises(UsageError, match=r"holds another study \(content of .*b.fmu was "):
-        sweep(chosen, folder=tmp_path)
+        sweep(chosen, out=tmp_path)
 
 
 def all_rows(path: Path) -> list[dict[str, Any]]:
@@ -177,7 +176,7 @@ def test_a_store_grows_and_keeps_its_rows(finished: Path, tmp_path: Path, grown:
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     path = store_path("study", tmp_path)
     before = {row["key"]: row["duration"] for row in all_rows(path)}
-    summary = sweep(grown, folder=tmp_path)
+    summary = sweep(grown, out=tmp_path)
     assert (summary.total, summary.flown) == (len(grown.points), flown)
     after = all_rows(path)
     assert [row["settings"] for row in after] == list(grown.points)
@@ -187,19 +186,19 @@ def test_a_store_grows_and_keeps_its_rows(finished: Path, tmp_path: Path, grown:
     for row, index in zip(after, range(len(after)), strict=True):
         direct = run(grown.system(index, starts())).metrics
         assert row["position_rmse"] == direct["position_rmse"]
-    assert sweep(study(PERIODS), folder=tmp_path).flown == 0, "expected what was taken out to be kept"
+    assert sweep(study(PERIODS), out=tmp_path).flown == 0, "expected what was taken out to be kept"
 
 
 def test_more_samples_keep_the_existing_ones_also_with_varying_seeds(tmp_path: Path) -> None:
     mass = Axis(name="mass", targets=("plant.mass",), low=0.9, high=1.1)
     for samples, flown in ((2, 2), (4, 2)):
         chosen = study(mass, base=short(noise={"position": 0.01}), samples=samples, vary_seed=True)
-        assert sweep(chosen, folder=tmp_path).flown == flown
+        assert sweep(chosen, out=tmp_path).flown == flown
 
 
 def test_the_name_of_a_study_and_the_signals_that_it_keeps_may_change(finished: Path) -> None:
     renamed = dataclasses.replace(study(PERIODS, keep_signals=(1,)), name="renamed")
-    assert sweep(renamed, folder=finished).total == 2
+    assert sweep(renamed, out=finished).total == 2
 
 
 def test_axes_of_seeds_run_those_seeds(tmp_path: Path) -> None:
@@ -219,8 +218,8 @@ def test_a_run_that_fails_is_a_row_with_its_message_and_is_repeated_on_request_o
     rows = bits(path)
     assert [row["status"] for row in rows] == ["done", "failed", "done"]
     assert rows[1]["message"].endswith("mass = 0.0: expected a finite value > 0")
-    assert sweep(chosen, folder=tmp_path).flown == 0
-    again = sweep(chosen, folder=tmp_path, retry_failed=True)
+    assert sweep(chosen, out=tmp_path).flown == 0
+    again = sweep(chosen, out=tmp_path, retry_failed=True)
     assert (again.flown, again.failed) == (1, 1)
     assert bits(path) == rows
 
@@ -257,7 +256,7 @@ def test_runs_that_fail_and_diverge_have_the_same_rows_with_two_workers(tmp_path
 )  # fmt: skip
 def test_a_design_with_an_invalid_run_is_refused_before_any_run(tmp_path: Path, chosen: Study, said: str) -> None:
     with pytest.raises(UsageError) as caught:
-        sweep(chosen, folder=tmp_path)
+        sweep(chosen, out=tmp_path)
     assert said in one_line(caught.value)
     assert len(one_line(caught.value)) < 500
     assert list(tmp_path.iterdir()) == []
@@ -293,7 +292,7 @@ def test_no_signals_are_kept_by_default_and_runs_are_repeated_for_signals_reques
     chosen = study(axis("timing.period", 0.01, 0.02))
     swept(chosen, tmp_path)
     assert not (tmp_path / "signals").exists()
-    summary = sweep(dataclasses.replace(chosen, keep_signals=(1,)), folder=tmp_path)
+    summary = sweep(dataclasses.replace(chosen, keep_signals=(1,)), out=tmp_path)
     assert summary.flown == 1
     assert len(list((tmp_path / "signals").iterdir())) == 1
 
@@ -325,7 +324,7 @@ def test_an_evaluator_raises_the_error_of_a_failed_run() -> None:
 
 def test_without_workers_a_sweep_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="workers = 0: expected at least 1"):
-        sweep(study(PERIODS), folder=tmp_path, workers=0)
+        sweep(study(PERIODS), out=tmp_path, workers=0)
 
 
 def test_the_store_describes_its_study(finished: Path) -> None:

@@ -62,12 +62,12 @@ def test_without_workers_the_design_of_a_store_does_not_grow(tmp_path: Path, mon
     def unreachable(inputs: Any, address: str) -> Any:
         raise QuadcosimError(f"--dask {address}: expected a dask scheduler with workers there")
 
-    sweep(study(axis("timing.period", 0.01), base=short()), folder=tmp_path, progress=None, announce=None)
+    sweep(study(axis("timing.period", 0.01), base=short()), out=tmp_path, progress=None, announce=None)
     monkeypatch.setattr(sweeping, "cluster", unreachable)
     monkeypatch.setattr(sweeping, "expect_scheduler", lambda address: None)
     more = study(axis("timing.period", 0.01, 0.02), base=short())
     with pytest.raises(QuadcosimError, match="expected a dask scheduler with workers there"):
-        sweep(more, folder=tmp_path, dask="tcp://nowhere:8786", progress=None, announce=None)
+        sweep(more, out=tmp_path, dask="tcp://nowhere:8786", progress=None, announce=None)
     with open_for_reading(store_path("study", tmp_path)) as store:
         assert store.about()["total"] == "1"
 
@@ -80,7 +80,7 @@ def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_with_the_reason(tmp_p
     system = System(stop_time=0.1, components={"it": Component(fmu=str(fmu), step=0.01)})
     hangs = Study(name="hangs", base=system, axes=(Axis(name=gain, targets=(gain,), values=(1.0, 3.0)),))
     out = tmp_path / "out"
-    found = sweep(hangs, folder=out, dask=cluster.address, time_limit=2.0, progress=None, announce=None)
+    found = sweep(hangs, out=out, dask=cluster.address, time_limit=2.0, progress=None, announce=None)
     assert (found.total, found.failed) == (2, 1)
     with open_for_reading(found.path) as store:
         rows = {row["design_index"]: row["message"] for row in store.rows()}
@@ -91,7 +91,7 @@ def test_a_run_that_hangs_in_a_dask_worker_is_a_failed_row_with_the_reason(tmp_p
 def test_fmus_run_in_children_of_dask_workers_and_send_no_pickle(tmp_path: Path, cluster: Cluster) -> None:
     tells = f'{{ char name[999]; snprintf(name, 999, "{tmp_path}/pid%d", (int)getpid()); FILE *p = fopen(name, "w");'
     chosen = hostile(tmp_path, more=f"{tells} if (p) fclose(p); }}")
-    found = sweep(chosen, folder=tmp_path / "out", dask=cluster.address, progress=None, announce=None)
+    found = sweep(chosen, out=tmp_path / "out", dask=cluster.address, progress=None, announce=None)
     expect_its_own_runs_to_fail(found.path, tmp_path)
     told = {int(file.name.removeprefix("pid")) for file in tmp_path.glob("pid*")}
     assert told
@@ -147,14 +147,14 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 )  # fmt: skip
 def test_a_missing_scheduler_is_reported_in_one_line(tmp_path: Path, address: str, said: str) -> None:
     with pytest.raises(QuadcosimError, match=rf"dask = {address}: {said}") as caught:
-        sweep(study(PERIODS), folder=tmp_path, dask=address)
+        sweep(study(PERIODS), out=tmp_path, dask=address)
     one_line(caught.value)
 
 
 def test_the_store_can_be_used_after_a_missing_scheduler(tmp_path: Path) -> None:
     with pytest.raises(QuadcosimError, match="dask = nonsense: "):
-        sweep(study(PERIODS), folder=tmp_path, dask="nonsense")
-    assert sweep(study(PERIODS), folder=tmp_path).flown == 2
+        sweep(study(PERIODS), out=tmp_path, dask="nonsense")
+    assert sweep(study(PERIODS), out=tmp_path).flown == 2
 
 
 @in_test_all
@@ -162,7 +162,7 @@ def test_the_store_can_be_used_after_a_missing_scheduler(tmp_path: Path) -> None
 def test_a_scheduler_without_workers_is_reported_in_one_line(tmp_path: Path) -> None:
     said = "expected a dask scheduler with workers there"
     with closing(Cluster(tmp_path, workers=0)) as deserted, pytest.raises(QuadcosimError, match=said) as caught:
-        sweep(study(PERIODS), folder=tmp_path / "out", dask=deserted.address)
+        sweep(study(PERIODS), out=tmp_path / "out", dask=deserted.address)
     one_line(caught.value)
 
 
@@ -230,7 +230,7 @@ def test_a_scheduler_that_is_stopped_ends_the_sweep_in_one_line_and_it_can_be_re
     end: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     chosen = study(axis("timing.period", 0.01, 0.02, 0.03, 0.04))
-    whole = bits(sweep(chosen, folder=tmp_path / "whole").path)
+    whole = bits(sweep(chosen, out=tmp_path / "whole").path)
 
     def stop(done: int, total: int) -> None:
         if done and own.scheduler.poll() is None:
@@ -241,10 +241,10 @@ def test_a_scheduler_that_is_stopped_ends_the_sweep_in_one_line_and_it_can_be_re
 
     with closing(Cluster(tmp_path, workers=1)) as own:
         with pytest.raises(QuadcosimError, match=r"finished runs are kept, start the sweep again$") as caught:
-            sweep(chosen, folder=tmp_path / "out", dask=own.address, progress=stop)
+            sweep(chosen, out=tmp_path / "out", dask=own.address, progress=stop)
         one_line(caught.value)
     assert capfd.readouterr().err == ""
     assert 0 < rows_in(tmp_path / "out" / "study.sqlite") < 4
-    found = sweep(chosen, folder=tmp_path / "out")
+    found = sweep(chosen, out=tmp_path / "out")
     assert found.flown < 4
     assert bits(found.path) == whole

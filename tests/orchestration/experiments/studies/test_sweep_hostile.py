@@ -86,6 +86,6 @@ def expect_its_own_runs_to_fail(path: Path, folder: Path) -> None:
 @pytest.mark.parametrize("forged", [False, True], ids=["no hash", "a forged hash"])
 def test_a_hostile_fmu_fails_its_own_runs_and_no_other(forged: bool, tmp_path: Path) -> None:
     before = own_limits()
-    found = sweep(hostile(tmp_path, forged=forged), folder=tmp_path / "out", workers=2, progress=None, announce=None)
+    found = sweep(hostile(tmp_path, forged=forged), out=tmp_path / "out", workers=2, progress=None, announce=None)
     expect_its_own_runs_to_fail(found.path, tmp_path)
     assert own_limits() == before

@@ -122,7 +122,7 @@ def test_whatever_is_killed_the_table_is_that_of_an_undisturbed_sweep(
 def test_a_sweep_in_lanes_whose_coordinator_is_killed_has_the_same_bits(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(NOISY)
-    whole = bits(sweep(load_study(path), folder=tmp_path / "whole", engine="batch").path)
+    whole = bits(sweep(load_study(path), out=tmp_path / "whole", engine="batch").path)
     tally = disturbed(tmp_path, whole, workers=1, kills=1, engine="batch", seed=141)
     assert (tally.coordinators, tally.workers) == (1, 0)
 
@@ -145,7 +145,7 @@ def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path,
     base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
     masses = axis("plant.mass", 1.0, ABORTS, 1.01, SPENT, 1.02)
     told: list[str] = []
-    summary = sweep(study(masses, base=base), folder=tmp_path, workers=workers, announce=told.append)
+    summary = sweep(study(masses, base=base), out=tmp_path, workers=workers, announce=told.append)
     rows = bits(summary.path)
     assert [row["design_index"] for row in rows if row["status"] == "failed"] == [1]
     assert [row["message"].partition(",")[0] for row in rows if row["status"] == "failed"] == [
@@ -158,7 +158,7 @@ def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path,
 def test_a_run_that_is_killed_repeatedly_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
     base = dataclasses.replace(short(), plant=FmuChoice(fmu=str(sick_plant(tmp_path))))
     with pytest.raises(QuadcosimError, match=r"run 1 ended by SIGKILL 3 times: not caused by the run") as caught:
-        sweep(study(axis("plant.mass", 1.0, KILLED), base=base), folder=tmp_path)
+        sweep(study(axis("plant.mass", 1.0, KILLED), base=base), out=tmp_path)
     one_line(caught.value)
     assert rows_in(store_path("study", tmp_path)) == 1
 
@@ -182,16 +182,16 @@ def test_a_failure_of_the_environment_stops_the_sweep_without_a_row(
 
     monkeypatch.setattr(Pool, "_unpack", unpack)
     with pytest.raises(QuadcosimError, match="not a failure of a run: ") as caught:
-        sweep(study(PERIODS), folder=tmp_path, workers=2)
+        sweep(study(PERIODS), out=tmp_path, workers=2)
     one_line(caught.value)
     monkeypatch.undo()
     assert rows_in(store_path("study", tmp_path)) == 0
-    assert sweep(study(PERIODS), folder=tmp_path).flown == 2
+    assert sweep(study(PERIODS), out=tmp_path).flown == 2
 
 
 def test_other_software_in_a_worker_stops_the_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = {**versions(), "sources": "other"}
     monkeypatch.setattr("orchestration.simulation.workers.pool.versions", lambda: other)
     with pytest.raises(QuadcosimError, match="has another version of sources than the coordinator; expected the same"):
-        sweep(study(PERIODS), folder=tmp_path)
+        sweep(study(PERIODS), out=tmp_path)
     assert rows_in(store_path("study", tmp_path)) == 0

@@ -67,7 +67,7 @@ def swept(system: System, tmp_path_factory: pytest.TempPathFactory) -> tuple[Stu
     """Periods below and above the largest that is stable, 2 s and 1.43 s, by gains of the velocity."""
     folder = tmp_path_factory.mktemp("swept")
     chosen = Study(name="study", base=system, axes=(axis(PERIOD, 0.5, 1.5, 4.0), axis(K_D, 1.0, 1.4)))
-    assert sweep(chosen, folder=folder).failed == 0
+    assert sweep(chosen, out=folder).failed == 0
     return chosen, folder
 
 
@@ -83,10 +83,10 @@ def test_rows_of_a_system_have_its_objectives_and_its_outcomes(swept: tuple[Stud
 
 def test_a_study_of_a_system_is_not_run_again_unless_an_objective_changes(swept: tuple[Study, Path]) -> None:
     chosen, folder = swept
-    assert sweep(chosen, folder=folder).flown == 0
+    assert sweep(chosen, out=folder).flown == 0
     other = dataclasses.replace(chosen.origin, objectives={**chosen.origin.objectives, "late": "max(plant.x)"})
     with pytest.raises(UsageError, match=r"holds another study \(objectives.late was .*, is \"max\(plant.x\)\"\)"):
-        sweep(dataclasses.replace(chosen, base=other), folder=folder)
+        sweep(dataclasses.replace(chosen, base=other), out=folder)
 
 
 def test_the_figure_of_a_system_is_of_its_first_objective_that_varies(swept: tuple[Study, Path]) -> None:
@@ -130,7 +130,7 @@ def test_an_fmu_may_be_an_axis(system: System, tmp_path: Path) -> None:
     copy.write_bytes(fmu.read_bytes())
     base = dataclasses.replace(system, stop_time=1.0)
     chosen = Study(name="study", base=base, axes=(axis("components.controller.fmu", str(fmu), str(copy)),))
-    sweep(chosen, folder=tmp_path)
+    sweep(chosen, out=tmp_path)
     first, second = bits(store_path("study", tmp_path))
     assert first["key"] == second["key"], "expected the content to count"
     assert first["late"] == second["late"]
@@ -171,7 +171,7 @@ def test_an_invalid_run_refuses_the_study_of_a_system(
     system: System, tmp_path: Path, target: str, value: Any, said: str
 ) -> None:
     with pytest.raises(UsageError) as caught:
-        sweep(Study(name="study", base=system, axes=(axis(target, value),)), folder=tmp_path)
+        sweep(Study(name="study", base=system, axes=(axis(target, value),)), out=tmp_path)
     assert said in one_line(caught.value)
     assert list(tmp_path.iterdir()) == []
 
@@ -187,7 +187,7 @@ def test_objectives_that_are_invalid_as_columns_are_refused() -> None:
 
 def test_an_objective_of_any_name_is_a_column(system: System, tmp_path: Path) -> None:
     odd = dataclasses.replace(system, stop_time=0.5, objectives={'a "b"; c': "max(plant.x)"}, criterion=Criterion())
-    path = sweep(Study(name="study", base=odd, axes=(axis("seed", 1),)), folder=tmp_path).path
+    path = sweep(Study(name="study", base=odd, axes=(axis("seed", 1),)), out=tmp_path).path
     with open_for_reading(path) as store:
         (row,) = store.rows()
     assert (row['a "b"; c'], row["outcome"], row["good"]) == (1.0, None, None)

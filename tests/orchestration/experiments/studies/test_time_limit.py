@@ -42,7 +42,7 @@ def test_a_run_that_hangs_is_a_failed_row_with_the_reason(waits: str, tmp_path: 
         stop_time=0.1, components={"it": Component(fmu=str(path), step=0.01)}, objectives={"last": "max(it.y)"}
     )
     study = Study(name="hangs", base=system, axes=(Axis(name=GAIN, targets=(GAIN,), values=(1.0, 3.0, 2.0)),))
-    found = sweep(study, folder=tmp_path / "out", time_limit=1.0, progress=None, announce=None)
+    found = sweep(study, out=tmp_path / "out", time_limit=1.0, progress=None, announce=None)
     assert (found.total, found.flown, found.failed) == (3, 3, 1)
     with open_for_reading(found.path) as store:
         rows = {row["design_index"]: (row["status"], row["message"]) for row in store.rows()}

@@ -74,10 +74,10 @@ def test_rows_are_those_of_the_fmus_and_the_command_reports_their_agreement(
 def test_a_sweep_continues_and_repeats_no_run(tmp_path: Path) -> None:
     few = study(axis("timing.period", 0.01, 0.02))
     more = study(axis("timing.period", 0.01, 0.02, 0.03))
-    assert sweep(few, folder=tmp_path, engine="batch").flown == 2
-    summary = sweep(more, folder=tmp_path, engine="batch")
+    assert sweep(few, out=tmp_path, engine="batch").flown == 2
+    summary = sweep(more, out=tmp_path, engine="batch")
     assert (summary.flown, summary.total) == (1, 3)
-    assert sweep(more, folder=tmp_path, engine="batch").agreement is None
+    assert sweep(more, out=tmp_path, engine="batch").agreement is None
 
 
 def test_a_run_that_its_fmus_refuse_has_the_same_row_as_outside_of_lanes(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_a_system_without_lanes_is_refused_before_any_run(tmp_path: Path) -> Non
     """
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     with pytest.raises(UsageError, match=r"components.one: small.fmu: expected a native FMU"):
-        sweep(load_study(tmp_path / "study.toml"), folder=tmp_path / "out", engine="batch")
+        sweep(load_study(tmp_path / "study.toml"), out=tmp_path / "out", engine="batch")
     assert not (tmp_path / "out" / "study.sqlite").exists()
 
 

@@ -97,18 +97,18 @@ def test_an_unknown_engine_is_refused() -> None:
 def test_a_sweep_reports_its_engine_and_keeps_it(tmp_path: Path) -> None:
     lines: list[str] = []
     chosen_study = study(axis("timing.period", 0.01, 0.02))
-    summary = sweep(chosen_study, folder=tmp_path, engine="auto", announce=lines.append)
+    summary = sweep(chosen_study, out=tmp_path, engine="auto", announce=lines.append)
     assert lines[0] == "engine batch: native FMUs, many runs at once"
     assert (summary.engine, summary.study.native) == ("batch", True)
     with open_for_reading(summary.path) as opened:
         assert opened.about()["engine"] == "batch"
     lines.clear()
-    sweep(chosen_study, folder=tmp_path, engine="auto", announce=lines.append)
+    sweep(chosen_study, out=tmp_path, engine="auto", announce=lines.append)
     assert not lines, "expected silence where no run is left"
 
 
 def test_a_sweep_of_foreign_fmus_reports_which_has_no_lanes(tmp_path: Path) -> None:
     system = System(stop_time=0.1, components={"one": Component(fmu=str(small(tmp_path)), step=0.01)})
     lines: list[str] = []
-    sweep(study(axis("seed", 1, 2), base=system), folder=tmp_path, engine="auto", announce=lines.append)
+    sweep(study(axis("seed", 1, 2), base=system), out=tmp_path, engine="auto", announce=lines.append)
     assert "one run at a time (components.one: " in lines[0]

@@ -59,14 +59,14 @@ def study(
 @needs_compiler
 def test_a_sweep_with_a_wrong_expression_leaves_nothing(temporary: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"there is no it\.z"):
-        sweep(study(tmp_path, objective="max(it.z)"), folder=tmp_path / "out", progress=None, announce=None)
+        sweep(study(tmp_path, objective="max(it.z)"), out=tmp_path / "out", progress=None, announce=None)
     assert not list(temporary.iterdir())
 
 
 @needs_compiler
 def test_a_sweep_whose_fmu_does_not_start_leaves_nothing(temporary: Path, tmp_path: Path) -> None:
     wrong = study(tmp_path, "EXITS_AT_START", gains=(1.0, 2.0))
-    assert sweep(wrong, folder=tmp_path / "out", workers=2, progress=None, announce=None).failed == 2
+    assert sweep(wrong, out=tmp_path / "out", workers=2, progress=None, announce=None).failed == 2
     assert not list(temporary.iterdir())
 
 
@@ -77,7 +77,7 @@ def test_an_interrupted_sweep_leaves_nothing(temporary: Path, tmp_path: Path) ->
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sweep(study(tmp_path), folder=tmp_path / "out", workers=2, progress=interrupt, announce=None)
+        sweep(study(tmp_path), out=tmp_path / "out", workers=2, progress=interrupt, announce=None)
     assert not list(temporary.iterdir())
 
 
