@@ -118,7 +118,7 @@ def test_a_changed_study_is_refused_with_the_changes(finished: Path, changed: St
     before = bits(store_path("study", finished))
     with pytest.raises(UsageError, match=rf"holds another study \({said}") as caught:
         sweep(changed, out=finished)
-    assert "expected the same one: take another folder, or remove the store" in one_line(caught.value)
+    assert "expected the same one: take another folder, out, or remove the store" in one_line(caught.value)
     assert bits(store_path("study", finished)) == before
 
 
