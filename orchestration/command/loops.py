@@ -114,11 +114,18 @@ def locus(
         _draw(found.plot(), out)
     rows = [("crossing", "value", "pole", "frequency")]
     for one in found.crossings:
-        pole = f"{one.real:.4f}" + (f" ± {one.imaginary:.4f}j" if one.imaginary else "")
+        pole = f"{one.z.real:.4f}" + (f" ± {one.z.imag:.4f}j" if one.z.imag else "")
         way = "leaves" if one.leaves else "returns"
         rows.append((way, quantity(one.value, found.unit, 6), pole, f"{one.frequency:.4g} rad/s"))
     each = [[[pole.real, pole.imag] for pole in some if pole == pole] for some in found.poles.tolist()]
-    document = {**vars(found), "values": found.values.tolist(), "radius": found.radius.tolist(), "poles": each}
+    crossings = [
+        {"value": x.value, "leaves": x.leaves, "real": x.z.real, "imaginary": x.z.imag, "frequency": x.frequency}
+        for x in found.crossings
+    ]
+    document = {
+        **vars(found), "values": found.values.tolist(), "radius": found.radius.tolist(), "poles": each,
+        "crossings": crossings,
+    }  # fmt: skip
     lines = list(in_columns(rows, right=True)) if found.crossings else []
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
 

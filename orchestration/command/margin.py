@@ -167,14 +167,17 @@ def linearise(
         "name": loop.name,
         "component": _matrices(loop.component),
         "rest": _matrices(loop.rest),
-        "poles": [dataclasses.asdict(pole) for pole in loop.poles],
+        "poles": [
+            {"real": one.z.real, "imaginary": one.z.imag, "frequency": one.frequency, "damping": one.damping}
+            for one in loop.poles
+        ],
     }
     lines = [f"{name:<17}  {_summary(half, loop.samples)}" for name, half in halves.items()]
     rows = [("pole", "size", "frequency", "damping")]
     for pole in loop.poles:
-        if pole.imaginary >= 0.0:
-            size, damping = abs(complex(pole.real, pole.imaginary)), pole.damping
-            place = f"{pole.real:.4f}" + (f" ± {pole.imaginary:.4f}j" if pole.imaginary else "")
+        if pole.z.imag >= 0.0:
+            size, damping = abs(pole.z), pole.damping
+            place = f"{pole.z.real:.4f}" + (f" ± {pole.z.imag:.4f}j" if pole.z.imag else "")
             damped = "-" if damping is None else f"{damping:.3f}"
             rows.append((place, f"{size:.4f}", f"{pole.frequency:.4g} rad/s", damped))
     lines += in_columns(rows, right=True) if loop.poles else ()

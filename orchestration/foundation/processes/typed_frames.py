@@ -28,7 +28,7 @@ DEEPEST = 32
 _MOST_DIMENSIONS = 8
 _NUMBERS = "biufc"
 """Kinds of the dtypes of arrays"""
-_TUPLE, _INTEGER, _ARRAY, _RECORD, _ERROR, _PATH, _SET, _FRACTION = range(8)
+_TUPLE, _INTEGER, _ARRAY, _RECORD, _ERROR, _PATH, _SET, _FRACTION, _COMPLEX = range(9)
 """Codes of what MessagePack does not have"""
 _Plain = str | bool | int | float | None
 
@@ -117,6 +117,8 @@ def _extended(value: Any) -> Any:
         return _ext(_SET, sorted(value))
     if isinstance(value, Fraction):
         return _ext(_FRACTION, [value.numerator, value.denominator])
+    if isinstance(value, complex):
+        return _ext(_COMPLEX, [value.real, value.imag])
     raise TypeError(f"{type(value).__name__} is no data that a process may send")
 
 
@@ -189,6 +191,7 @@ _READERS: Mapping[int, Callable[[bytes, int], Any]] = {
     _PATH: lambda data, depth: Path(expect(unpack(data, depth), str)),
     _SET: lambda data, depth: frozenset(expect(unpack(data, depth), list[Any])),
     _FRACTION: lambda data, depth: Fraction(*expect(unpack(data, depth), list[int])),
+    _COMPLEX: lambda data, depth: complex(*expect(unpack(data, depth), list[float])),
 }
 _SCALARS: Mapping[Any, Any] = {
     float: (int, float, np.integer, np.floating), int: (int, np.integer), bool: (bool, np.bool_),

@@ -138,7 +138,7 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=BLACK, linewidth=1.0))
         dots = axes.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
         for one in result.crossings:
-            axes.plot([one.real] * 2, [one.imaginary, -one.imaginary], "x", color=RED, linestyle="none")
+            axes.plot([one.z.real] * 2, [one.z.imag, -one.z.imag], "x", color=RED, linestyle="none")
         axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
     half = min(MOST, NEAR * float(np.median(np.sort(np.abs(poles - 1.0))[: (len(poles) + 1) // 2])))
     plane.set(xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN))

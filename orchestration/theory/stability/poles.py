@@ -22,10 +22,8 @@ Complexes = npt.NDArray[np.complex128]
 class Pole:
     """A pole z of a sampled loop, and that of continuous time, s = log(z) / dt."""
 
-    real: float
-    """Real part of z."""
-    imaginary: float
-    """Imaginary part of z."""
+    z: complex
+    """The pole in the z-plane."""
     frequency: float
     """Natural frequency |s| [rad/s]; of an aperiodic motion the rate of its decay or growth."""
     damping: float | None
@@ -41,7 +39,7 @@ def _as_pole(z: complex, dt: float) -> Pole:
     is_drift = abs(z - 1.0) < DRIFT
     s = 0j if is_drift else cmath.log(z) / dt
     damping = None if is_drift else -s.real / abs(s)
-    return Pole(real=z.real, imaginary=z.imag, frequency=abs(s), damping=damping)
+    return Pole(z=z, frequency=abs(s), damping=damping)
 
 
 def poles_of(matrix: Floats) -> Complexes:

@@ -54,10 +54,8 @@ class Crossing:
     """Its value, in the unit of the quantity: where they jump, the last one at which the loop is stable."""
     leaves: bool
     """Whether the loop is unstable above it; else below."""
-    real: float
-    """The real part of the pole on the circle, or of the one that has jumped out of it."""
-    imaginary: float
-    """Its imaginary part, of a pair that of the upper one."""
+    z: complex
+    """The pole on the circle, or the one that has jumped out of it; of a pair the upper one."""
     frequency: float
     """Its frequency [rad/s]: 0 of a pole at 1, half the sampling rate of one at -1."""
 
@@ -223,7 +221,4 @@ def _short(value: float, unit: str | None) -> float:
 
 def _crossing(value: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:
     pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
-    return Crossing(
-        value=value, leaves=leaves, real=pole.real, imaginary=pole.imag,
-        frequency=abs(math.atan2(pole.imag, pole.real)) / period,
-    )  # fmt: skip
+    return Crossing(value=value, leaves=leaves, z=pole, frequency=abs(math.atan2(pole.imag, pole.real)) / period)

@@ -38,7 +38,7 @@ def test_data_come_back_as_they_were() -> None:
     for value in (
         None, True, -3, 2**200, 0.1, float("inf"), "text", "\udcff", b"bytes", [1, [2.0]], (1, (2, "three")),
         {"a": (1,)}, {(1, 2): None}, frozenset({"b", "a"}), Fraction(1, 3), Path("a/b"), np.float32(0.1), np.int64(3),
-        Leak(where="tank", rate=None, parts=(Leak(where="valve", rate=1.0),)),
+        1 - 2j, Leak(where="tank", rate=None, parts=(Leak(where="valve", rate=1.0),)),
     ):  # fmt: skip
         back = unpack(pack(value))
         assert (back, type(back)) == (value, type(value))
