@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypeVar, cast
+from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar, cast
 
 from orchestration.components.building.models import PATHS
 from orchestration.experiments.studies.axes import CONTROLLER, Axis, LinkedSettings, Scale, Value, span
@@ -41,6 +41,9 @@ class AxisTable:
     """Whether the range has equal steps or equal ratios."""
 
 
+METRICS = "metrics of your own are expressions under [base.objectives], or [objectives] of the scenario or system file"
+
+
 class DesignTable(
     table_of(  # type: ignore[misc]
         Study, only=["method", "samples", "design_seed", "vary_seed", "repeat"], called={"design_seed": "seed"}
@@ -65,6 +68,13 @@ class StudyFile:
     """The sampling of the axes without values."""
     keep_signals: list[int] | bool = False
     """The runs whose signals are kept, by their index in the design; true for all."""
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        "metrics": METRICS,
+        "objectives": METRICS,
+        "controllers": "parameters of one of several controllers stand under [controllers.NAME] of a vehicle file, "
+        'vehicle = "FILE.toml" under [base]; the same controller with several is what quadcosim compare takes',
+    }
+    """Hints where the content of these keys belongs"""
 
 
 FileLike: TypeAlias = str | os.PathLike[str] | Mapping[str, Any]

@@ -186,12 +186,17 @@ def docs_of_keys(shape: Any) -> dict[str, str]:
 
 def keys_at(shape: Any, place: Sequence[Any]) -> list[str]:
     """The keys of the table at a place of a document of this shape."""
+    shape = _shape_at(shape, place)
+    return [*fields_of(shape), *getattr(getattr(shape, "declared_by", shape), "SHORTHANDS", ())]
+
+
+def _shape_at(shape: Any, place: Sequence[Any]) -> Any:
     parts = iter(place)
     for part in parts:
         shape, one_of_many = _table_in(fields_of(shape)[part].annotation)
         if one_of_many:
             next(parts)
-    return [*fields_of(shape), *getattr(getattr(shape, "declared_by", shape), "SHORTHANDS", ())]
+    return shape
 
 
 def _table_in(hint: Any) -> tuple[Any, bool]:
@@ -263,6 +268,10 @@ def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapp
     place = ".".join(map(str, parts))
     if problem["type"] in _UNKNOWN:
         key = str(parts[-1])
+        shape = _shape_at(file, parts[:-1])
+        elsewhere = getattr(getattr(shape, "declared_by", shape), "ELSEWHERE", {})
+        if key in elsewhere:
+            return f"{place}: no such key; {elsewhere[key]}"
         return no_such_key(place.removesuffix(key), key, keys_at(file, parts[:-1]))
     if problem["type"] in _MISSING:
         return f"{place}: expected a value"

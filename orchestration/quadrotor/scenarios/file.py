@@ -58,6 +58,7 @@ def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
         reference=_signal("reference", file.reference, ReferenceChoice, folder),
         disturbance=_signal("disturbance", file.disturbance, DisturbanceChoice, folder),
         record=file.record,
+        objectives=file.objectives,
     )
 
 

@@ -20,6 +20,7 @@ from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario_text import text_of
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
+from orchestration.simulation.results.objectives import with_own_objectives
 from orchestration.simulation.results.quantities import setting
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.description import describe_varying
@@ -69,6 +70,14 @@ class Scenario:
     the gusts."""
     record: Record = field(default_factory=Record)
     """The variables to record beside those that the two FMUs exchange."""
+    objectives: Mapping[str, str] = field(default_factory=dict)
+    """Metrics of your own beside those of every flight: expressions by name."""
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        "metrics": "metrics of your own are expressions under [objectives]",
+        "controllers": '[controllers.NAME] is a table of a vehicle file, vehicle = "FILE.toml"; '
+        "parameters of the one controller of this file stand under [controller]",
+    }
+    """Hints where the content of these keys belongs"""
 
     def __post_init__(self) -> None:
         require_positive(self, "stop_time")
@@ -166,7 +175,8 @@ class Scenario:
         changes |= {f"sources.reference.{key}": value for key, value in reference.items()}
         if not reference and this.controller.parameters.get(USE_REFERENCE_INPUTS) is True:
             raise UsageError(f"controller.{USE_REFERENCE_INPUTS}: expected [reference] name or file = … to feed them")
-        return translation.disturbed(changed(translation.quadrotor(), changes), this.disturbance)
+        system = translation.disturbed(changed(translation.quadrotor(), changes), this.disturbance)
+        return with_own_objectives(system, this.objectives, "objectives")
 
     def in_own_terms(self, text: str) -> str:
         """`text` with the paths of the system replaced by the names of a scenario."""
@@ -181,9 +191,9 @@ class Scenario:
         return range_of(self.timing, quantity)
 
     def near_continuous(self, period: float) -> "Scenario":
-        """The same with a `period` [s] near continuous time, no delay, loss or noise, and no further records."""
+        """The same with a `period` [s] near continuous time, no delay, loss or noise, and no records or metrics."""
         timing = Timing(period=period, plant_interval=self.timing.plant_interval)
-        return dataclasses.replace(self, timing=timing, record=Record(plant=(), controller=()))
+        return dataclasses.replace(self, timing=timing, record=Record(plant=(), controller=()), objectives={})
 
     def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
         """Likely mistakes: a nominal model or axes that are not the plant's, a run too short for its timing."""

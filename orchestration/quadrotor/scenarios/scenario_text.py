@@ -33,6 +33,8 @@ def text_of(scenario: "Scenario") -> str:
     record = {key: list(value) for key, value in dataclasses.asdict(scenario.record).items() if value is not None}
     if record:
         tables["record"] = record
+    if scenario.objectives:
+        tables["objectives"] = dict(scenario.objectives)
     return tomli_w.dumps(tables)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.basics.unit_algebra import after
@@ -171,6 +171,21 @@ def _arrivals(system: System, time: Floats, events: Events) -> dict[str, Boolean
         rows[x.name] = np.zeros(len(instants), dtype=np.bool_)
         rows[x.name][at[instants[at] == times]] = True
     return rows
+
+
+def with_own_objectives(system: System, objectives: Mapping[str, str], table: str) -> System:
+    """The system with further objectives, of a table in errors; raises `UsageError` for what cannot be one."""
+    if not isinstance(objectives, Mapping):
+        raise UsageError(f"{table} = {shown(repr(objectives))}: expected a dictionary of expressions by name")
+    taken = [*system.objectives, *system.optional, *FIXED]
+    for name, text in objectives.items():
+        if name in taken:
+            raise UsageError(f"{table}: {name}: expected another name; this one is taken")
+        if not isinstance(text, str):
+            raise UsageError(
+                f"{table}: {name} = {shown(text)}: expected an expression as text, as in 'max(plant.tilt)'"
+            )
+    return replace(system, objectives={**system.objectives, **objectives}) if objectives else system
 
 
 def with_available_objectives(system: System, signals: set[str], numbers: set[str]) -> System:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.read_description import Model, read_model
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import warn
@@ -27,7 +27,7 @@ from orchestration.simulation.engines.resolved import (
 )
 from orchestration.simulation.requests.ranges import unit_at
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.results.objectives import FIXED, OUTCOME, Metrics
+from orchestration.simulation.results.objectives import FIXED, OUTCOME, Metrics, with_own_objectives
 from orchestration.simulation.runs.arguments import names_in
 from orchestration.simulation.runs.columns import Columns, columns, first_differences
 from orchestration.simulation.runs.flights import Flights
@@ -81,7 +81,7 @@ def fly(
     expect_workers(workers)
     loaded, record = request_of(request), names_in(record, "record")
     with errors_in_own_terms(loaded):
-        system = _measured(located(loaded.as_system()), metrics)
+        system = with_own_objectives(located(loaded.as_system()), metrics, "metrics")
         models = {
             name: read_model(Path(component.fmu), component.access) for name, component in system.components.items()
         }
@@ -225,21 +225,6 @@ def _with_sources(
         numbers = {**parameters, **{name: float(column[place]) for name, column in runs.parameters.items()}}
         signals |= source_signals(runs.seeded(place), numbers, signals["time"])
     return rows_of(signals, record)
-
-
-def _measured(system: System, metrics: Mapping[str, str]) -> System:
-    """The system with objectives of the caller's own too; raises `UsageError` for what cannot be one."""
-    if not isinstance(metrics, Mapping):
-        raise UsageError(f"metrics = {shown(repr(metrics))}: expected a dictionary of expressions by name")
-    taken = [*system.objectives, *system.optional, *FIXED]
-    for name, text in metrics.items():
-        if name in taken:
-            raise UsageError(f"metrics: {name}: expected another name; this one is taken")
-        if not isinstance(text, str):
-            raise UsageError(
-                f"metrics: {name} = {shown(text)}: expected an expression as text, as in 'max(plant.tilt)'"
-            )
-    return replace(system, objectives={**system.objectives, **metrics}) if metrics else system
 
 
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:

@@ -197,6 +197,21 @@ def test_an_unknown_key_is_reported_with_the_known_ones(tmp_path: Path, text: st
     assert f"{place}: no such key; expected one of {valid}" in line
 
 
+def test_metrics_of_ones_own_are_objectives_of_the_base_and_elsewhere_the_error_says_so(tmp_path: Path) -> None:
+    tilt = 'tilt_max = "max(plant.tilt)"\n'
+    study = load(tmp_path, f"[base.objectives]\n{tilt}{ONE}")
+    assert study.metric_names[-1] == "tilt_max"
+    assert study.system(0, {}).objectives["tilt_max"] == "max(plant.tilt)"
+    (tmp_path / "base.toml").write_text(study.base.to_toml())
+    assert load(tmp_path, f'scenario = "base.toml"\n{ONE}').base.as_system() == study.base.as_system()
+    for text, there in ((f"[metrics]\n{tilt}{ONE}", "[base.objectives]"), (f"[base.metrics]\n{tilt}{ONE}", "[obj")):
+        assert f"metrics: no such key; metrics of your own are expressions under {there}" in refused(tmp_path, text)
+    for table in ("controllers", "base.controllers"):
+        assert 'a vehicle file, vehicle = "FILE.toml"' in refused(tmp_path, f"[{table}.X]\nvelocity_ratio = 1\n{ONE}")
+    taken = refused(tmp_path, f'[base.objectives]\nposition_max = "1"\n{ONE}')
+    assert "objectives: position_max: expected another name; this one is taken" in taken
+
+
 @pytest.mark.parametrize("target", ["timing.rate", "nonsense", "wind.amplitude.x", "timing", "plant", ""])
 def test_an_unknown_target_is_reported_with_the_known_ones(tmp_path: Path, target: str) -> None:
     line = refused(tmp_path, f'[[axes]]\nname = "x"\nsets = ["{target}"]\nvalues = [1]\n')
