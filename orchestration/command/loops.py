@@ -123,8 +123,8 @@ def locus(
         for x in found.crossings
     ]
     document = {
-        **vars(found), "values": found.values.tolist(), "radius": found.radius.tolist(), "poles": each,
-        "crossings": crossings,
+        "of": found.of, "unit": found.unit, "values": found.values.tolist(), "radius": found.radius.tolist(),
+        "poles": each, "crossings": crossings,
     }  # fmt: skip
     lines = list(in_columns(rows, right=True)) if found.crossings else []
     return CommandResult(document=document, verdict=found.verdict, lines=lines)

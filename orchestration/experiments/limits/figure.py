@@ -115,6 +115,7 @@ def _draw_limits(axes: Axes, result: Limit, across: Quantity) -> None:
         (result.large_signal_limit, RED, "-", "measured limit"),
         (result.local_lower_limit, ORANGE, "--", "local lower limit, by theory"),
         (result.local_limit, ORANGE, "--", "local limit, by theory"),
+        (result.mean_square_limit, ORANGE, ":", "mean-square limit, by theory"),
         (result.refuted_limit, GREY, "-.", f"{RELIABILITY:.0%} refuted"),
     )
     left, right = axes.get_xlim()

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.linearise import Linearised
@@ -76,15 +78,29 @@ def jumps_of(system: System, name: str) -> tuple[float, ...]:
     """The `jumps` of all that a sampled component sends, less than a sample, in rising order."""
     own, found = system.components[name].sampling, set[Fraction]()
     for x in system.connections:
-        other = system.components[x.receiver].sampling if x.sender == name else None
-        if own is None or other is None:
+        apart = apart_of(system, x) if x.sender == name else None
+        if own is None or apart is None:
             continue
-        ratio = other.true_period / own.true_period
-        apart = own.true_period / ratio.denominator
-        first = (other.true_offset - own.true_offset - exact_nanoseconds(lowest(x.delay))) % apart
-        if ratio.denominator <= MOST_JUMPS:
-            found.update(first + k * apart for k in range(ratio.denominator))
+        first = (apart.first - exact_nanoseconds(lowest(x.delay))) % apart.interval
+        if own.true_period / apart.interval <= MOST_JUMPS:
+            found.update(first + k * apart.interval for k in range(int(own.true_period / apart.interval)))
     return tuple(float(jump) / NANOSECONDS for jump in sorted(found))
+
+
+class Apart(NamedTuple):
+    """Delays of a connection at which a message comes just at a sample of its receiver [ns]."""
+
+    first: Fraction
+    interval: Fraction
+
+
+def apart_of(system: System, connection: Connection) -> Apart | None:
+    """Those of a connection; None where its ends are not both sampled."""
+    own, other = (system.components[end].sampling for end in (connection.sender, connection.receiver))
+    if own is None or other is None:
+        return None
+    interval = own.true_period / (other.true_period / own.true_period).denominator
+    return Apart((other.true_offset - own.true_offset) % interval, interval)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +112,7 @@ class LateCommand:
     frequencies: Floats
     late: Late
     known: dict[float, tuple[Linearised, Complexes]] = field(default_factory=dict)
-    """By the part of a sample by which it is late: the loop, and the sensitivity of the command over its samples"""
+    """Loop and sensitivity of the command over its samples, by the part of a sample by which it is late"""
 
     @property
     def sides(self) -> list[float]:

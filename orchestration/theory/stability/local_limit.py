@@ -2,28 +2,29 @@
 
 import math
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
+from itertools import groupby
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.bisection import Bracket, Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.number_text import some
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.excitation import ImpreciseError
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
-from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearise import known_to
-from orchestration.theory.stability.loop_at_rest import KnownTangents
+from orchestration.theory.stability.loop_at_rest import KnownTangents, precision_of
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
     NotAnEquilibriumError,
+    beside_others,
     deterministic,
     hyperperiod,
     hyperperiod_of,
-    periods_of,
 )
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
@@ -111,8 +112,7 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
     slope = (growths[above] - growths[below]) / (above - below)
     difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE) - growths[below])
-    wholes = [one.whole if isinstance(one, LiftedTangent) else one for _, _, one in known.values()]
-    precise = known_to(max((one.precision for one in wholes), default=0.0))
+    precise = known_to(precision_of(one for _, _, one in known.values()))
     return replace(found, method=f"{LOOP}{precise}", accuracy=found.accuracy + difference / slope)
 
 
@@ -154,16 +154,13 @@ def _rate(at: Callable[[float], System], instances: Instances, factor: float, va
 
 def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | None:
     """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period."""
-    first, last = (periods_of(at(value)) for value in (span.first, span.last))
-    others = sorted({b for a, b in zip(first, last) if a == b})
-    varied = [b for a, b in zip(first, last) if a != b]
-    if not varied or not others:
+    beside, values = beside_others(at, span.first, span.last), span.values()
+    if beside is None:
         return None
-
-    values = span.values()
+    others, unit = beside
 
     def multiples(period: Fraction) -> list[float]:
-        step = float(period / varied[0]) * span.last
+        step = float(period) * unit
         counts = range(math.ceil(values[0] / step), math.floor(span.last / step) + 1)
         return [float(f"{k * step:.12g}") for k in counts]
 
@@ -174,16 +171,30 @@ def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | 
 
 
 def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimit:
-    """The first value at which small deviations grow, of those tried, up and down from the system's own."""
+    """The first value at which small deviations grow, up and down from the system's own, and all that were found."""
     if not rates.scan:
         return LinearLimit(reason="no local limit: several rates, which repeat together at no value of the scan")
-    ends = ends_of_good(lambda value: growth(value) > 0.0, rates.scan, span.own, span.last)
+    tried = dict[float, float]()
+
+    def grows(value: float) -> bool:
+        tried[value] = growth(value)
+        return tried[value] > 0.0
+
+    ends = ends_of_good(grows, rates.scan, span.own, span.last)
+    for value in rates.scan:  # beyond, where a loop that is unstable need not come to rest
+        with suppress(UsageError):
+            _ = value in tried or grows(value)
     lower, upper = (None if end is None or end.good is None else _narrowed(growth, end, rates.fine) for end in ends)
-    bad = upper.bad if upper is not None else None if ends.upper is None else ends.upper.bad
-    first = "none is unstable" if bad is None else f"the first unstable value tried is {bad:.6g}{span.unit}"
+    runs = [
+        [value for value, _ in run]
+        for is_bad, run in groupby(sorted(tried.items()), key=lambda one: one[1] > 0.0)
+        if is_bad
+    ]
+    each = [f"{run[0]:.6g}" if len(run) == 1 else f"{run[0]:.6g} to {run[-1]:.6g}" for run in runs]
     reason = (
-        f"local: {first}, of {len(rates.scan)} from {rates.scan[0]:.6g} to {rates.scan[-1]:.6g}{span.unit} at which "
-        "the several rates repeat together: stability need not be an interval, and others between may be unstable"
+        f"local: small deviations grow at {some(each, ', ') + span.unit if each else 'none'}, of {len(tried)} values "
+        f"from {rates.scan[0]:.6g} to {rates.scan[-1]:.6g}{span.unit} at which the several rates repeat together: "
+        "stability need not be an interval, and others between may be unstable"
     )
     limit = _middle(upper)
     accuracy = None if upper is None or upper.good is None else 0.5 * (upper.bad - upper.good)

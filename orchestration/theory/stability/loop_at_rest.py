@@ -1,7 +1,7 @@
 """A system at rest at its operating point, and its components about it, each as a `Tangent`."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -89,8 +89,7 @@ class AtRest:
     @property
     def precision(self) -> float:
         """The error of its components that round coarsely, relative; 0: there are none."""
-        wholes = [one.whole if isinstance(one, LiftedTangent) else one for one in self.tangents.values()]
-        return max((one.precision for one in wholes), default=0.0)
+        return precision_of(self.tangents.values())
 
     def tangent(self, name: str) -> AnyTangent:
         """A component about rest."""
@@ -229,6 +228,12 @@ def begin_of(calm: System, period: Fraction) -> Fraction:
     """
     delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
     return latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
+
+
+def precision_of(tangents: Iterable[AnyTangent]) -> float:
+    """The largest error of those that round coarsely, relative; 0: there are none."""
+    wholes = (one.whole if isinstance(one, LiftedTangent) else one for one in tangents)
+    return max((one.precision for one in wholes), default=0.0)
 
 
 def samples_of(found: AnyTangent | SampledRest) -> int:

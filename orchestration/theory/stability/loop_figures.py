@@ -144,7 +144,7 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     plane.set(xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN))
     close.set(xlim=(1.0 - half, 1.0 + half), ylim=(-half, half), title="about z = 1")
     figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
-    over.plot(values, result.radius, color=BLUE)
+    over.plot(across.of(result.curve[0]), result.curve[1], color=BLUE)
     over.axhline(1.0, color=BLACK, linewidth=1.0)
     for one in result.crossings:
         at = (float(across.of(one.value)), 1.0)

@@ -1,7 +1,7 @@
 """A system at its operating point, without randomness and quantisation, and whether it rests there."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -78,6 +78,13 @@ def periods_of(system: System) -> list[Fraction]:
     return [one.sampling.true_period for one in system.components.values() if one.sampling is not None] or [
         exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None
     ]
+
+
+def beside_others(at: Callable[[float], System], first: float, last: float) -> tuple[list[Fraction], float] | None:
+    """The other periods [ns] of a loop of which a quantity is one, and its value by nanosecond; None: it is none."""
+    ends = list(zip(*(periods_of(at(value)) for value in (first, last))))
+    others, varied = sorted({b for a, b in ends if a == b}), [b for a, b in ends if a != b]
+    return (others, last / float(varied[0])) if varied and others else None
 
 
 def latest_offset(system: System) -> Fraction:

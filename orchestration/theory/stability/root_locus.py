@@ -24,9 +24,16 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart_of
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
-from orchestration.theory.stability.operating_point import LONGEST_HYPERPERIOD, hyperperiod_of
+from orchestration.theory.stability.linearise import known_to
+from orchestration.theory.stability.loop_at_rest import KnownTangents, precision_of, whole_at_rest
+from orchestration.theory.stability.operating_point import (
+    LONGEST_HYPERPERIOD,
+    beside_others,
+    hyperperiod,
+    hyperperiod_of,
+)
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Complexes, poles_of
 from orchestration.theory.stability.sign_changes import zero_between
@@ -39,8 +46,6 @@ COUNT = 40
 SHARE = 0.2
 """Share of the range of a limit by default, farther than which nearly all loops have long left the circle"""
 MAX_COUNT = 10_000
-IRREGULAR = 0.6180339887
-"""Share of the way between two values, commensurate with no other period"""
 DIGITS = 6
 """Digits of its values in a sentence"""
 
@@ -77,6 +82,10 @@ class RootLocus:
     """The poles at each, shape (n, m), without those at 0, of what is forgotten; where there are fewer, NaN."""
     crossings: tuple[Crossing, ...]
     """Values at which poles cross the unit circle, in rising order."""
+    curve: Floats = field(repr=False)
+    """All values that were tried, also beside jumps, and the spectral radius at each, shape (2, k)."""
+    precision: float = 0.0
+    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
 
     @property
     def verdict(self) -> str:
@@ -86,15 +95,16 @@ class RootLocus:
             return quantity(value, self.unit, DIGITS)
 
         first, last = shown(self.values[0]), shown(self.values[-1])
+        known = f"(small deviations{known_to(self.precision)})"
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
-            return f"{self.of}: poles {begins} the unit circle from {first} to {last}, {radii} (small deviations)"
+            return f"{self.of}: poles {begins} the unit circle from {first} to {last}, {radii} {known}"
         ways = [
             f"{'leave' if one.leaves else 'return'} at {shown(one.value)}, {one.frequency:.4g} rad/s"
             for one in self.crossings
         ]
-        return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} (small deviations)"
+        return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} {known}"
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
@@ -123,8 +133,10 @@ def locus(
 
     Quantities are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the period of
     the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
-    times that of the file, delays up to ten periods. Holds and delays are included; jitter,
-    loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen.
+    times that of the file, delays up to ten periods. Holds and delays are included; jitter, loss, noise and
+    quantisation are left out. A pair of crossings between two neighbouring values is not seen, but for jumps of a delay
+    to a sampled component: both sides of each are tried. A period beside others crosses between two at which all
+    coincide.
 
     Raises `UsageError` for an invalid quantity or range, and as `linearise`.
     """
@@ -153,44 +165,65 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
             raise UsageError(_incommensurate(varied, system, values, repeats))
 
         def radius(value: float) -> float:
+            if value in found:
+                return _radius(found[value][0])
             try:
                 with whole_at_rest(changed(system, dict.fromkeys(varied.paths, value)), instances, known=known) as loop:
                     found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
             except UsageError as error:
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
-            return float(np.abs(found[value][0]).max(initial=0.0))
+            return _radius(found[value][0])
 
-        radii, crossings = list[float](), list[Crossing]()
+        short, tried = _shortening(varied, system, values, unit), _beside_jumps(varied, system, values)
+        crossings = list[Crossing]()
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
-            for place in range(len(values) - 1, -1, -1):
-                radii.insert(0, radius(values[place]))
-                report(1.0 - place / len(values))
-                if len(radii) < 2 or (radii[0] < 1.0) == (radii[1] < 1.0):
-                    continue
-                low, high = values[place], values[place + 1]
-                if repeats(_short(low + IRREGULAR * (high - low), unit)):
-                    inside, outside = zero_between(
-                        lambda value: radius(value) - 1.0,
-                        lambda value: _short(value, unit),
-                        (low, radii[0] - 1.0),
-                        (high, radii[1] - 1.0),
-                    )
-                else:  # a period beside others, which coincide with few of its values
-                    inside, outside = (low, high) if radii[0] < 1.0 else (high, low)
-                crossings.insert(0, _crossing(inside, *found[outside], leaves=radii[0] < 1.0))
+            high = radius(tried[-1])
+            for place in range(len(tried) - 2, -1, -1):
+                above, high = high, radius(tried[place])
+                report(1.0 - place / len(tried))
+                if (high < 1.0) != (above < 1.0):
+                    ends = ((tried[place], high - 1.0), (tried[place + 1], above - 1.0))
+                    inside, outside = zero_between(lambda value: radius(value) - 1.0, short, *ends)
+                    crossings.insert(0, _crossing(inside, *found[outside], leaves=high < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
     for row, known_poles in zip(poles, each, strict=True):
         row[: len(known_poles)] = known_poles
+    curve = np.array([(value, _radius(found[value][0])) for value in sorted(found)]).T
     return RootLocus(
-        of=varied.of,
-        unit=unit,
-        values=np.array(values),
-        radius=np.array(radii),
-        poles=poles,
-        crossings=tuple(crossings),
-    )
+        of=varied.of, unit=unit, values=np.array(values), radius=np.array([_radius(one) for one in each]), poles=poles,
+        crossings=tuple(crossings), curve=curve, precision=precision_of(one for _, _, one in known.values()),
+    )  # fmt: skip
+
+
+def _radius(poles: Complexes) -> float:
+    return float(np.abs(poles).max(initial=0.0))
+
+
+def _shortening(varied: Varied, system: System, values: list[float], unit: str | None) -> Callable[[float], float]:
+    """The function to the nearest value that is tried: of a period beside others one at which they coincide."""
+    beside = beside_others(lambda value: changed(system, dict.fromkeys(varied.paths, value)), values[0], values[-1])
+    if beside is None:
+        return lambda value: _short(value, unit)
+    whole = hyperperiod(beside[0])
+    fractions = (whole / count for count in range(LONGEST_HYPERPERIOD, 0, -1))
+    step = float(next(one for one in fractions if one.denominator == 1)) * beside[1]
+    return lambda value: _short(step * round(value / step), unit)
+
+
+def _beside_jumps(varied: Varied, system: System, values: list[float]) -> list[float]:
+    """The values, and those to both sides of each jump between them, of a delay to a sampled component."""
+    found, (first, last) = set(values), (values[0] * NANOSECONDS, values[-1] * NANOSECONDS)
+    for x in system.connections:
+        apart = apart_of(system, x) if f"connections.{x.name}.delay" in varied.paths else None
+        if apart is None or last - first > MOST_JUMPS * apart.interval:
+            continue
+        counts = range(math.floor((last - apart.first) / apart.interval) + 1)
+        jumps = (float(apart.first + k * apart.interval) / NANOSECONDS for k in counts)
+        sides = (round(jump + side, 9) for jump in jumps for side in SIDES)
+        found.update(side for side in sides if values[0] <= side <= values[-1])
+    return sorted(found)
 
 
 def _incommensurate(varied: Varied, system: System, values: list[float], repeats: Callable[[float], bool]) -> str:

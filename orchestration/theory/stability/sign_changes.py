@@ -47,8 +47,8 @@ def zero_between(
     for trial in range(TRIALS):
         (a, below), (b, above) = low, high
         secant, half = short(a - below * (b - a) / (above - below)), short(0.5 * (a + b))
-        middle = half if trial > SECANTS or secant in (a, b) else secant
-        if middle in (a, b):
+        middle = secant if trial <= SECANTS and a < secant < b else half
+        if not a < middle < b:
             break
         value = of(middle)
         if abs(value) < zero:

@@ -12,7 +12,7 @@ from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.theory.stability.frequency import expect_decided, receivers_of
-from orchestration.theory.stability.linearise import Linearised, clock_of, linearise
+from orchestration.theory.stability.linearise import Linearised, clock_of, known_to, linearise
 from orchestration.theory.stability.loop_halves import ClosedLoop, closed
 
 if TYPE_CHECKING:
@@ -61,6 +61,8 @@ class Step:
     """Times of the samples [s], shape (n,)."""
     responses: Floats = field(repr=False)
     """Share of each step that the law takes back, shape (loops, n)."""
+    precision: float = 0.0
+    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
 
     @property
     def verdict(self) -> str:
@@ -70,7 +72,7 @@ class Step:
         settled = f"settles in {quantity(slowest.settling_time, 's')}"
         return (
             f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
-            f"{clock_of(self.dt, self.samples)} (small deviations)"
+            f"{clock_of(self.dt, self.samples)} (small deviations{known_to(self.precision)})"
         )
 
     @property
@@ -112,7 +114,10 @@ def step(request: RequestLike, component: str | None = None) -> Step:
     settled = np.asarray(np.linalg.solve(np.eye(len(whole.A)) - whole.A, whole.steps @ each), dtype=float)
     final = _taken_back(whole, each, settled).mean(axis=1)
     found = (_figures(loop, request, i, times, responses[i], float(final[i])) for i in range(count))
-    return Step(dt=loop.dt, samples=loop.samples, loops=tuple(found), times=times, responses=responses)
+    return Step(
+        dt=loop.dt, samples=loop.samples, loops=tuple(found), times=times, responses=responses,
+        precision=loop.precision,
+    )  # fmt: skip
 
 
 def _taken_back(whole: ClosedLoop, each: Floats, state: Floats) -> Floats:

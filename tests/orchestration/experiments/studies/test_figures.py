@@ -331,6 +331,12 @@ def test_a_limit_without_linear_theory_is_drawn_without_the_radius(tmp_path: Pat
     assert draw_limit(short(), limit("timing.loss"), tmp_path, PNG) == [tmp_path / "limit_timing_loss.png"]
 
 
+def test_the_mean_square_limit_is_a_line_of_the_figure() -> None:
+    (axes,) = limit_figure.limit_figure(limit("timing.loss", mean_square_limit=0.07)).axes
+    (line,) = (line for line in axes.lines if str(line.get_label()).startswith("mean-square limit, by theory"))
+    assert np.asarray(line.get_xdata()) == pytest.approx([70.0, 70.0])
+
+
 def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

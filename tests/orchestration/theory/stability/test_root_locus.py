@@ -59,6 +59,21 @@ def test_what_is_forgotten_is_no_pole() -> None:
     assert np.sort(poles_of(rotation @ chain @ rotation.T).real) == pytest.approx([-0.25, 0.5])
 
 
+def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> None:
+    """Within a twentieth of the other one, though both values of the locus are two of it apart."""
+    system, period = example("dc_servo"), "components.controller.sampling.period"
+    servo = dataclasses.replace(system.components["servo"], step=None, sampling=Sampling(period=0.008))
+    both = dataclasses.replace(system, components={**system.components, "servo": servo})
+    found = locus(both, period, first=0.008, last=0.024, count=2)
+    (crossing,) = found.crossings
+    assert crossing.leaves
+    before, after = (
+        linearise(changed(both, {period: round(crossing.value + later, 9)}), "controller").radius
+        for later in (0.0, 0.0004)
+    )
+    assert before < 1.0 < after
+
+
 def test_a_locus_of_one_value_is_refused() -> None:
     with pytest.raises(UsageError, match="count = 1: expected a number from 2"):
         locus(example("dc_servo"), DELAY, first=0.0, last=0.02, count=1)
