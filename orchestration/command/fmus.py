@@ -2,18 +2,22 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fmu_kit.scratch import temporary_folder
 from orchestration.command import verdicts
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, expect_positive, option_group, result_of_files
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.components.building import consent
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.terminal import inform, progress_bar
+from orchestration.foundation.basics.terminal import in_columns, inform, progress_bar
 from orchestration.foundation.processes.resource_limits import Limits
+
+if TYPE_CHECKING:
+    from orchestration.components.checks.validation.finding import Finding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +111,11 @@ def build(
 
 @option_group("limits", LimitFlags)
 def validate(
-    fmu: Annotated[list[Path] | None, typer.Argument(help="FMUs; without any, those of this project.")] = None,
+    fmu: Annotated[
+        list[Path] | None,
+        typer.Argument(help="FMUs, or files that describe code in C; without any, FMUs of this project."),
+    ] = None,
+    rules: Annotated[bool, option("--rules", "List all rules, with what they check.")] = False,
     *,
     limits: LimitFlags,
 ) -> CommandResult:
@@ -115,11 +123,13 @@ def validate(
 
     Accepts any FMU of FMI 2.0 or 3.0: for co-simulation, model exchange, in event mode, for scheduled execution. Those
     built by quadcosim are checked for the rules of this project too. All checks run in a separate process with limits.
+    A file that wrap takes is made an FMU as with sanitize = true, which is not kept: its code is checked while it runs.
     """
     from orchestration.components.building import fmus
     from orchestration.components.building.models import MODELS
-    from orchestration.components.checks.validation.validator import validate as findings_of
 
+    if rules:
+        return _rules()
     paths = fmu or [fmus.locate(name, inform) for name in MODELS]
     for path in paths:
         if not path.is_file():
@@ -128,7 +138,7 @@ def validate(
     with progress_bar("checking") as progress:
         for done, path in enumerate(paths):
             progress(done / len(paths))
-            findings = findings_of(path, limits=limits.limits)
+            findings = _findings(path, limits.limits)
             document.append({"fmu": path, "findings": findings})
             count = sum(not finding.note for finding in findings)
             problems += count
@@ -136,6 +146,32 @@ def validate(
             lines.extend(f"  {finding}" for finding in findings)
     verdict = verdicts.of_problems(problems, len(paths))
     return CommandResult(document={"fmus": document}, verdict=verdict, lines=lines, good=not problems)
+
+
+def _findings(path: Path, limits: Limits) -> list["Finding"]:
+    """Those of an FMU, or of the code that a file describes."""
+    from orchestration.components.building import wrap
+    from orchestration.components.building.models import WRAPPED
+    from orchestration.components.checks.validation.validator import validate as findings_of
+
+    if path.suffix != WRAPPED:
+        return findings_of(path, limits=limits)
+    consent.agree(path.parent)
+    with temporary_folder() as folder:
+        return findings_of(wrap.build(path, folder / wrap.fmu_of(path).name, sanitize=True), limits=limits)
+
+
+def _rules() -> CommandResult:
+    """All rules, with what they check."""
+    from orchestration.components.checks.validation import rules
+    from orchestration.components.checks.validation.finding import name_of
+
+    groups = {"for every FMU": rules.STANDARD, "for FMUs that quadcosim built": rules.OURS}
+    checked = {
+        of: {name_of(rule): (rule.__doc__ or "").splitlines()[0] for rule in group} for of, group in groups.items()
+    }
+    lines = [line for of, group in checked.items() for line in ("", of, *in_columns([*group.items()]))]
+    return CommandResult(document={"rules": checked}, lines=lines[1:])
 
 
 @option_group("limits", LimitFlags)

@@ -219,13 +219,14 @@ def _hash_of(path: Path) -> str | None:
         return None
 
 
-def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None) -> Path:
+def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None, sanitize: bool = False) -> Path:
     """Make the FMU `out` of a file, in a separate process, since the code runs for its start values.
 
+    With `sanitize` the code is checked while it runs, also where its file does not say so.
     Raises `UsageError` for code that cannot be wrapped as it is, naming line and symbol, and `QuadcosimError` for what
     is missing here.
     """
-    content = json.dumps(description_of(path))
+    content = json.dumps({**description_of(path), **({"sanitize": True} if sanitize else {})})
     if version == 3:
         _expect_names_of_clocks(path)
     done = subprocess.run(

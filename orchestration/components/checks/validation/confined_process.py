@@ -27,6 +27,7 @@ from orchestration.components.fmi.archive import (
     read_checked_root,
     read_root,
 )
+from orchestration.components.fmi.crashes import report_crashes
 from orchestration.components.fmi.read_description import Model, declared_of, read_model
 from orchestration.components.fmi.slaves import FOLDERS, expect_readable_place
 from orchestration.foundation.basics.errors import UsageError
@@ -40,7 +41,9 @@ READABLE, PLATFORM = "readable", "platform"
 
 def main(path: str, folder: str, time: str, size: str) -> None:
     """Try every rule that applies to the FMU; limits in [s] and [MB]."""
-    check(Path(path), Path(folder), Limits(time=float(time), size=float(size)), Reporter(Parent().send))
+    reporter = Reporter(Parent().send)
+    report_crashes(reporter.crashed)
+    check(Path(path), Path(folder), Limits(time=float(time), size=float(size)), reporter)
 
 
 def check(path: Path, folder: Path, limits: Limits, report: Reporter) -> None:

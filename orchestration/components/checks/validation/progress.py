@@ -15,7 +15,7 @@ MAX_FINDING_LENGTH = 1000
 """Characters of the text of a finding"""
 _BEAT = 0.02
 """Least time between two beats [s]"""
-_MESSAGES = ("begin", "beat", "finding", "failed", "end")
+_MESSAGES = ("begin", "beat", "finding", "crashed", "failed", "end")
 """Methods of `ReceivedReport` that a message may name"""
 Frame = tuple[Any, ...]
 """One of these, and its arguments"""
@@ -43,6 +43,10 @@ class Reporter:
         """The rule has a finding."""
         whole = text if len(text) <= MAX_FINDING_LENGTH else f"{text[:MAX_FINDING_LENGTH]} ..."
         self._send(("finding", whole, isinstance(text, Note)))
+
+    def crashed(self, place: str) -> None:
+        """The C of the FMU crashes at a place."""
+        self._send(("crashed", place))
 
     def failed(self, error: Exception) -> None:
         """The validation itself fails."""
@@ -85,6 +89,8 @@ class ReceivedReport:
         """the one begun last"""
         self.ended = False
         self.error: str | None = None
+        self.place = ""
+        """Place where its C crashed; empty: it has not, or no line is known"""
         self.last_beat: float | None = None
         """Time at which a call of the FMU last began or returned, by the clock; None if there was none"""
         self._clock = clock
@@ -104,6 +110,10 @@ class ReceivedReport:
     def finding(self, text: str, note: bool) -> None:
         """The rule has a finding."""
         self.findings.append(Finding(str(self.rule), text, note=note))
+
+    def crashed(self, place: str) -> None:
+        """The C of the FMU crashes at a place."""
+        self.place = place
 
     def failed(self, error: str) -> None:
         """The validation itself fails."""

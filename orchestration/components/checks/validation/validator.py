@@ -57,4 +57,5 @@ def _of_ending(received: ReceivedReport, ending: Ending, silent: float | None, l
         return [Finding(PROCESS, text)]
     if ending.code == 0 and received.ended:
         return []
-    return [Finding(PROCESS, f"the process of the FMU {ending.description} {moment}")]
+    place = f", at {received.place}" if received.place else ""
+    return [Finding(PROCESS, f"the process of the FMU {ending.description} {moment}{place}")]
