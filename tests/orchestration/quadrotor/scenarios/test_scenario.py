@@ -2,7 +2,7 @@
 
 from dataclasses import Field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pytest
 import tomli_w
@@ -157,6 +157,10 @@ def test_a_scenario_written_and_loaded_is_the_same(
     assert loaded(file, scenario.to_toml()) == scenario
 
 
+WITHOUT_EFFECT = {"model_mismatch"}
+"""Keys that only silence a warning"""
+
+
 @pytest.mark.parametrize(
     "field", [each for each in fields(Scenario) if isinstance(each.default, int | float)], ids=lambda each: each.name
 )
@@ -172,8 +176,23 @@ def test_a_number_of_a_scenario_is_read_written_shown_and_has_a_flag(field: Fiel
     assert key in flags, f"{key}: expected a flag, a field of `FlightFlags` in orchestration/command/flags.py"
     flagged = FlightFlags(**given).applied_to(Scenario())
     assert flagged == scenario, f"{key}: expected `applied_to` in orchestration/command/flags.py to set it"
+    reaches = scenario.as_system() != Scenario().as_system()
+    assert reaches is not (key in WITHOUT_EFFECT), (
+        f"{key}: expected another system by `as_system` of {home}/scenario.py; or it in WITHOUT_EFFECT of this test"
+    )
     page = (ROOT / "docs/start.md").read_text(encoding="utf-8")
     assert f"`{key}`" in page, f"{key}: expected it in docs/start.md, among what may be at the top of a scenario"
+
+
+@pytest.mark.parametrize("field", fields(Timing), ids=lambda each: each.name)
+def test_a_key_of_the_timing_reaches_the_system(field: Field[Any]) -> None:
+    words, usual = get_args(get_type_hints(Timing)[field.name]), getattr(Timing(), field.name)
+    other = (
+        {"position": 0.1} if usual == {} else words[-1] if isinstance(usual, str) else 0.002 if usual == 0.0 else 1.5
+    )
+    given: dict[str, Any] = {field.name: other}
+    reaches = Scenario(timing=Timing(**given)).as_system() != Scenario().as_system()
+    assert reaches, f"timing.{field.name}: expected its paths in TIMING of quadrotor/scenarios/translation.py"
 
 
 def test_what_is_written_names_every_timing_key_that_has_a_value(tmp_path: Path) -> None:
