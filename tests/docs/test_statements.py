@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+from typing import Any
 
 import pytest
 
@@ -22,6 +23,19 @@ ONE_WEIGHT_OF_THE_PROOF = re.compile(
     r"proof\s+(needs|asks\s+for\s+κ|does\s+not\s+go)|\(the\s+lyapunov\s+proof\)|\(lyapunov\s+proof\)|weight\s+of\s+the\s+proof",
     re.IGNORECASE,
 )
+
+
+def test_the_observer_of_the_page_of_controllers_follows_an_angle_that_moves_evenly() -> None:
+    page = (ROOT / "docs/own_controller.md").read_text(encoding="utf-8")
+    (block,) = (each for each in re.findall(r"```python\n(.*?)```", page, re.S) if "class Watching" in each)
+    made: dict[str, Any] = {}
+    exec(block, made)
+    watching = made["Watching"](instance_name="one")
+    for k in range(200):
+        watching.angle = 2.0 + 0.3 * 0.01 * k
+        watching.step(0.01 * k, 0.01)
+    assert watching.rate == pytest.approx(0.3, rel=1e-9)
+    assert watching.near == pytest.approx(watching.angle, rel=1e-9)
 
 
 def test_no_text_says_that_the_proof_needs_one_coupling() -> None:
