@@ -145,7 +145,9 @@ def _seeds(values: Sequence[Any]) -> Sequence[int]:
 
 
 def _array(target: str, value: Any) -> Any:
-    """A value as an array of numbers, truth values or texts; raises `UsageError` if it is none."""
+    """A value as an array of numbers, truth values or texts; raises `UsageError` if it is none, or is masked."""
+    if np.ma.is_masked(value):
+        raise UsageError(f"values of {target}: some are masked; expected a value for each run")
     try:
         array = np.asarray(value)
         if array.dtype == object:  # words in a column of pandas

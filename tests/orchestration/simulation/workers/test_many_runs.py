@@ -198,6 +198,11 @@ WRONG: list[tuple[Any, dict[str, Any], str]] = [
         {},
         rf"^values of {X}: expected an array of numbers, truth values or words, with one at",
     ),
+    (
+        {X: np.ma.masked_array([0.0, 1.0], [False, True])},
+        {},
+        rf"^values of {X}: some are masked; expected a value for each run$",
+    ),
     ({X: []}, {}, rf"^values of {X}: expected an array of numbers"),
     ([1, 2], {}, r"^values = \[1, 2\]: expected a dictionary of values by path, as \{'seed': 1\}$"),
     ({3: [1.0]}, {}, r"^values = \{3: \[1.0\]\}: expected paths as text, not 3$"),
