@@ -1,5 +1,6 @@
 """Slaves written out as C: the flight of them, and what it has in common with that of the same slaves in Python."""
 
+import hashlib
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
@@ -8,11 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from fmu_kit.archive import read_source_hash
 from fmu_kit.bundle import Target
 from fmu_kit.compiler.pack.c_compiler import Mathematics
+from orchestration.components.building import builder
 from orchestration.simulation.runs.result import Result
 from quadcosim import Scenario
 from tests.fmus.process import run
+from tests.places import ROOT
+
+KEPT = ROOT / ".cache" / "native_fmus"
 
 NATIVE = Scenario().with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
 """The paper's flight by the FMUs that fly fastest, with the same rows as those with Python inside."""
@@ -23,15 +29,25 @@ def native(**fields: Any) -> Scenario:
     return replace(NATIVE, **fields)
 
 
-def natives(targets: Iterable[Target], folder: Path, mathematics: Mathematics) -> dict[str, Path]:
-    """FMUs of slaves without Python inside, by model name; the slaves are of one place."""
+def natives(targets: Iterable[Target], mathematics: Mathematics, folder: Path | None = None) -> dict[str, Path]:
+    """FMUs of slaves without Python inside, by model name; the slaves are of one place.
+
+    Without a folder they are kept for all processes and later runs, and built again when their sources change.
+    """
     known = list(targets)
     root = known[0].root
-    place = () if root is None else ("--root", str(root))
-    names = [f"{target.module}:{target.model}" for target in known]
-    done = run(sys.executable, "-m", "tests.fmus.scripts.build_native", mathematics, str(folder), *place, *names)
-    assert done.returncode == 0, done.stderr
-    return {Path(line).stem: Path(line) for line in done.stdout.splitlines()}
+    where = folder or KEPT / hashlib.sha256(f"{mathematics} {root}".encode()).hexdigest()[:16]
+    paths = {target.model: where / f"{target.model}.fmu" for target in known}
+    names = [
+        f"{target.module}:{target.model}"
+        for target in known
+        if folder or read_source_hash(paths[target.model]) != builder.NATIVE.source_hash(target)
+    ]
+    if names:
+        place = () if root is None else ("--root", str(root))
+        done = run(sys.executable, "-m", "tests.fmus.scripts.build_native", mathematics, str(where), *place, *names)
+        assert done.returncode == 0, done.stderr
+    return paths
 
 
 def assert_the_same(one: Result, other: Result) -> None:

@@ -29,21 +29,21 @@ def system(name: str) -> System:
     return example(name, {"stop_time": SHORTER[name]} if name in SHORTER else {})
 
 
-def on_native(name: str, folder: Path, mathematics: Mathematics) -> Result:
+def on_native(name: str, mathematics: Mathematics) -> Result:
     """Its run with the same slaves written out as C."""
     asked = system(name)
     places = {Path(each.fmu).resolve().parent for each in asked.components.values()}
-    built = {k: v for place in places for k, v in natives(builder.slaves_of(place), folder, mathematics).items()}
+    built = {k: v for place in places for k, v in natives(builder.slaves_of(place), mathematics).items()}
     components = {key: replace(each, fmu=str(built[Path(each.fmu).stem])) for key, each in asked.components.items()}
     return run(replace(asked, components=components))
 
 
 @pytest.mark.parametrize("name", sample([*NAMES], 2))
-def test_an_example_on_the_same_libm_is_the_same_to_the_byte_without_python_inside(name: str, tmp_path: Path) -> None:
-    found = on_native(name, tmp_path, "libm")
+def test_an_example_on_the_same_libm_is_the_same_to_the_byte_without_python_inside(name: str) -> None:
+    found = on_native(name, "libm")
     assert len(found.rows) > 100
     assert_the_same(found, run(system(name)))
 
 
-def test_an_example_on_its_own_mathematics_is_near(tmp_path: Path) -> None:
-    assert_near(on_native("dc_servo", tmp_path, "own"), run(system("dc_servo")), 1e-9)
+def test_an_example_on_its_own_mathematics_is_near() -> None:
+    assert_near(on_native("dc_servo", "own"), run(system("dc_servo")), 1e-9)

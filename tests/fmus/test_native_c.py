@@ -109,7 +109,7 @@ def test_two_builds_in_two_folders_have_the_same_bytes(tmp_path: Path, monkeypat
         root = tmp_path / name
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / f"cache of {name}"))  # it is compiled twice
         shutil.copytree(EXAMPLES / "water_tank", root, ignore=shutil.ignore_patterns("*.fmu", "native", "__pycache__"))
-        built.append(natives([Target("tank", "Tank", root)], root / "made", "own")["Tank"].read_bytes())
+        built.append(natives([Target("tank", "Tank", root)], "own", root / "made")["Tank"].read_bytes())
     assert built[0] == built[1]
 
 

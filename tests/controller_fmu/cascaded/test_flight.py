@@ -72,8 +72,8 @@ def test_a_controller_that_remembers_has_no_loop_about_hover_of_the_vehicle_alon
 
 
 @in_test_all
-def test_in_c_it_flies_as_in_python_to_the_byte(built: dict[str, Path], tmp_path: Path) -> None:
-    fmu = natives([Target.parse(MODELS[NAME])], tmp_path, "libm")[NAME]
+def test_in_c_it_flies_as_in_python_to_the_byte(built: dict[str, Path]) -> None:
+    fmu = natives([Target.parse(MODELS[NAME])], "libm")[NAME]
     timing = Timing(period=0.004, jitter=0.001, measurement_loss=0.05)
     changed = {"controller.velocity_ratio": 5, "controller.attitude_ratio": 2, "controller.motor.arm.x": 0.5}
     assert_the_same(simulated(fmu, changed, timing, 1.0), simulated(built[NAME], changed, timing, 1.0))

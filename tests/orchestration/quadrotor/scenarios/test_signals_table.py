@@ -55,10 +55,10 @@ def test_a_flight_is_that_of_the_table(name: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def on_libm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def on_libm() -> dict[str, Path]:
     """The FMUs of the plant and of the laws by name, with the elementary functions that CPython takes."""
     targets = [Target.parse(MODELS[name]) for name in ("QuadrotorPlant", *LAWS)]
-    return natives(targets, tmp_path_factory.mktemp("native"), "libm")
+    return natives(targets, "libm")
 
 
 def flown_by(fmus: Mapping[str, str | Path], name: str) -> Result:
