@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.extent import WHOLE
 from tests.fmu_kit.compiler.compiled import HERE, compiler
 from tests.patience import PATIENCE
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-promotion", "-O2", "-fno-math-errno")
+LEVEL = "-O2" if WHOLE else "-O1"
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wdouble-promotion", LEVEL, "-fno-math-errno")
 ARM, QEMU = "arm-none-eabi-gcc", "qemu-system-arm"
 M4F = ("-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16")
 M7 = ("-mthumb", "-mfloat-abi=hard", "-mcpu=cortex-m7", "-mfpu=fpv5-d16")
@@ -111,7 +113,7 @@ def rows_of(lines: list[str]) -> NDArray[np.float64]:
 def _with(main: str, with_compiler: str, sources: list[Path], folder: Path, *machine: str) -> list[str]:
     places = [flag for where in (folder, *(source.parent for source in sources)) for flag in ("-I", str(where))]
     objects = [str(made(source, with_compiler, *machine)) for source in sources]
-    return [compiler(with_compiler), "-std=c99", "-O2", *machine, *places, str(HERE / main), *objects]
+    return [compiler(with_compiler), "-std=c99", LEVEL, *machine, *places, str(HERE / main), *objects]
 
 
 def _printed(command: list[str]) -> list[str]:

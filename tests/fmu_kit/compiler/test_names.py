@@ -12,10 +12,10 @@ from fmu_kit.bundle import Target
 from fmu_kit.compiler.emit.c_names import KEYWORDS
 from fmu_kit.compiler.emit.exchange import described
 from fmu_kit.compiler.emit.standards import STANDARDS
+from fmu_kit.compiler.pack import lanes
 from fmu_kit.compiler.pack.building import c_sources, modules_of
 from fmu_kit.compiler.pack.c_compiler import compiled_here
 from fmu_kit.compiler.pack.embedded_files import write
-from fmu_kit.compiler.pack.lanes import compiled_lanes
 from fmu_kit.compiler.passes.precomputing import precompute
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.tracing import trace
@@ -112,14 +112,17 @@ def target(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Target:
     return Target("names_of_c", "Instance", tmp_path)
 
 
-def test_a_slave_may_call_its_own_what_it_likes(target: Target, tmp_path: Path) -> None:
+def test_a_slave_may_call_its_own_what_it_likes(
+    target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     compiler("cc")
+    monkeypatch.setattr(lanes, "FOR_THIS_PROCESSOR", ("-O0",))  # names clash without optimisation too
     assert len(NAMES) > 140
     cls = slave_class(target)
     program = trace(cls, modules_of(target))
     sources = c_sources(program, GUID, STANDARDS[3])
     assert compiled_here(sources, STANDARDS[3].main, options=("-O0",))
-    assert compiled_lanes(sources, 2)
+    assert lanes.compiled_lanes(sources, 2)
     expected = answers(InPython(cls(instance_name="names")), {}, [{}] * 3)
     path = compiled(precompute(program), tmp_path / "names.so", "libm")
     assert answers(InC.made(cls, path), {}, [{}] * 3) == expected

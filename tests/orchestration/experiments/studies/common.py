@@ -15,9 +15,10 @@ from typing import Any
 
 from orchestration.experiments.studies import sweep as sweeping
 from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.store import Store, open_for_reading, store_path
+from orchestration.experiments.studies.store import Store, open_for_reading
 from orchestration.experiments.studies.store_columns import metrics_with
 from orchestration.experiments.studies.study import Study
+from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.swept import Swept
 from orchestration.quadrotor.scenarios.translation import paths_of, quadrotor
 from orchestration.simulation.workers.row import Outcome, Results, Rows
@@ -292,7 +293,6 @@ class Cluster:
 
 
 def reference_store(folder: Path, text: str = NOISY, engine: str = "compiled") -> Path:
-    """The store of a study run without interruption by one worker, through the command."""
+    """The store of a study run without interruption by one worker."""
     (folder / "study.toml").write_text(text)
-    quadcosim("sweep", "study.toml", "--engine", engine, cwd=folder)
-    return store_path("study", folder / "results" / "study")
+    return swept(load_study(folder / "study.toml"), folder / "results" / "study", engine=engine)

@@ -21,7 +21,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from quadcosim import QuadcosimError
 from tests.commands import Main
-from tests.extent import in_test_all
+from tests.extent import WHOLE, in_test_all
 from tests.orchestration.components.fmi.small import known, needs_compiler, small
 from tests.orchestration.experiments.studies.common import (
     PERIODS,
@@ -44,8 +44,8 @@ from tests.patience import PATIENCE
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """A dask scheduler with two workers."""
-    made = Cluster(tmp_path_factory.mktemp("cluster"), workers=2)
+    """A dask scheduler with a worker, or two where one will be killed."""
+    made = Cluster(tmp_path_factory.mktemp("cluster"), workers=2 if WHOLE else 1)
     yield made
     made.close()
 
