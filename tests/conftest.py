@@ -22,6 +22,7 @@ from orchestration.foundation.basics import terminal
 from tests.commands import Done, Main
 from tests.extent import tries
 from tests.fmus.making import MAKINGS, Making
+from tests.pictures import blank_pictures
 
 hypothesis.settings.register_profile("ci", derandomize=True, deadline=None, max_examples=tries(60, sampled=10))
 hypothesis.settings.register_profile("local", deadline=None)
@@ -124,6 +125,13 @@ def built(making: Making) -> dict[str, Path]:
     """The FMUs by model name, of the current sources: built once for all processes, and kept."""
     folder = builder.NATIVE.folder if making.native else ""
     return {model: fmus.locate(Path(folder, model).as_posix()) for model in MODELS}
+
+
+@pytest.fixture
+def blank_figures() -> Iterator[None]:
+    """Figures are not drawn, for tests of which files there are."""
+    with blank_pictures():
+        yield
 
 
 @pytest.fixture

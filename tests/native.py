@@ -18,7 +18,7 @@ from quadcosim import Scenario
 from tests.fmus.process import run
 from tests.places import ROOT
 
-KEPT = ROOT / ".cache" / "native_fmus"
+KEPT = ROOT / ".cache" / "built_for_tests"
 
 NATIVE = Scenario().with_fmus(plant="native/QuadrotorPlant", controller="native/UnifiedController")
 """The paper's flight by the FMUs that fly fastest, with the same rows as those with Python inside."""
@@ -29,6 +29,11 @@ def native(**fields: Any) -> Scenario:
     return replace(NATIVE, **fields)
 
 
+def kept(*what: str) -> Path:
+    """The folder of what is built for tests alone, shared by all processes and kept for later runs."""
+    return KEPT / hashlib.sha256(repr(what).encode()).hexdigest()[:16]
+
+
 def natives(targets: Iterable[Target], mathematics: Mathematics, folder: Path | None = None) -> dict[str, Path]:
     """FMUs of slaves without Python inside, by model name; the slaves are of one place.
 
@@ -36,7 +41,7 @@ def natives(targets: Iterable[Target], mathematics: Mathematics, folder: Path | 
     """
     known = list(targets)
     root = known[0].root
-    where = folder or KEPT / hashlib.sha256(f"{mathematics} {root}".encode()).hexdigest()[:16]
+    where = folder or kept(mathematics, str(root))
     paths = {target.model: where / f"{target.model}.fmu" for target in known}
     names = [
         f"{target.module}:{target.model}"

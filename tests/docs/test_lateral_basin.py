@@ -120,8 +120,8 @@ def test_a_mirrored_motion_is_the_mirror_of_the_motion() -> None:
 def test_the_form_that_is_kept_falls_over_boxes_here_and_there(period: float) -> None:
     """Some of those of which the proof is made; about rest, for all that the law may be there."""
     fall, generator = Decrease(Loop(period=period), read_ellipsoid(period)), np.random.default_rng(5)
-    direction = generator.standard_normal((6, 1500))
-    size = generator.uniform(0.02, 0.97, 1500)
+    direction = generator.standard_normal((6, 500))
+    size = generator.uniform(0.02, 0.97, 500)
     centre = size * direction / np.linalg.norm(direction, axis=0)
     assert (fall.over(Boxes(centre=centre, radius=np.full((6, 1), 0.005) * size)).anywhere.high < 0.0).all()
     assert is_positive(-fall.matrix(0.004))
@@ -129,9 +129,9 @@ def test_the_form_that_is_kept_falls_over_boxes_here_and_there(period: float) ->
 
 @pytest.mark.parametrize("period", PERIODS)
 def test_flights_from_its_edge_come_to_rest_and_stay_in_it(period: float) -> None:
-    loop, R, direction = Loop(period=period), read_ellipsoid(period), np.random.default_rng(6).standard_normal((6, 500))
+    loop, R, direction = Loop(period=period), read_ellipsoid(period), np.random.default_rng(6).standard_normal((6, 100))
     state = np.linalg.solve(R, direction / np.linalg.norm(direction, axis=0))
-    before = np.ones(500)
+    before = np.ones(100)
     for _ in range(round(6.0 / period)):
         state = loop.after(state)
         after = ((R @ state) ** 2).sum(axis=0)
@@ -211,7 +211,7 @@ def test_the_command_proves_what_was_kept(
 
 
 def test_flights_show_where_the_basin_ends_if_they_find_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("docs.lateral_basin.__main__.STARTS", 4)
+    monkeypatch.setattr("docs.lateral_basin.__main__.STARTS", 2)
     monkeypatch.setattr("docs.lateral_basin.__main__.FLIGHT", 10.0)
     assert np.isnan(first_losses(Loop(period=0.04))[STATES.index("φ")])
     assert not np.isnan(first_losses(Loop(period=0.1))).any()

@@ -46,7 +46,7 @@ def test_no_text_says_that_the_proof_needs_one_coupling() -> None:
 
 def outcome(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     with pytest.raises(SystemExit) as ended:
-        main([*arguments, "--stop-time", "15", "--json"])
+        main([*arguments, "--stop-time", "15", "--native", "--json"])
     assert not ended.value.code
     return str(json.loads(capsys.readouterr().out)["outcome"])
 

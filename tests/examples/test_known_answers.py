@@ -121,7 +121,7 @@ def test_the_servo_over_two_networks_costs_what_jitterbug_says(delays: tuple[flo
     assert found == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.03, 0.1])
+@pytest.mark.parametrize("delay", sample([0.03, 0.0, 0.1], 1))
 def test_lqg_costs_what_its_riccati_equations_say(delay: float) -> None:
     """To nine digits, with what is between samples, for a late command that filter and gain are designed for."""
     found = expect(lqg.at(delay, gain_knows=True, filter_knows=True)).objectives["J"]
@@ -141,13 +141,13 @@ def test_any_other_gain_or_filter_than_that_of_lqg_costs_more(delay: float) -> N
         return found
 
     least = cost({})
-    for name, value in sample([*values.items()], 3):
+    for name, value in sample([*values.items()], 2):
         size = 0.01 * max(0.1, abs(value))
         beside = [cost({f"{lqg.PARAMETERS}.{name}": value + sign * size}) for sign in (1, -1)]
         assert least < min(beside) < max(beside) < 1.01 * least
 
 
-@pytest.mark.parametrize(("period", "delay"), [(0.1, 0.25), (0.5, 0.0), (0.07, 1.0), (0.25, 0.1)])
+@pytest.mark.parametrize(("period", "delay"), sample([(0.07, 1.0), (0.5, 0.0), (0.1, 0.25), (0.25, 0.1)], 2))
 def test_tank_rises_by_a_period_and_a_delay_above_the_switch_and_no_more(period: float, delay: float) -> None:
     """The bound 2 + (T + d) · 1 m/s is reached, but for the micrometre that the level lacks at a sample."""
     last = math.floor(2.0 / period) * period  # a sample at which the level is a micrometre below the switch

@@ -1,5 +1,6 @@
 """Libraries for other systems: what the system of each asks of them, and that they are of the same sources."""
 
+import importlib.metadata
 import importlib.util
 import io
 import shutil
@@ -12,12 +13,15 @@ import fmpy
 import pefile
 import pytest
 
-from fmu_kit.bundle import PackagingError
+from fmu_kit.archive import read_source_hash
+from fmu_kit.bundle import PackagingError, Target
 from fmu_kit.compiler.pack.c_compiler import compiled_for, targets_of, universal
 from fmu_kit.compiler.pack.c_compiler import compiler as compiler_here
 from orchestration.components.building import builder, fmus
+from orchestration.components.building.models import MODELS
 from orchestration.components.checks.doctor.binaries import newest, read
 from tests.extent import in_test_all, sample
+from tests.native import kept
 from tests.places import EXAMPLES
 
 needs_zig = pytest.mark.skipif(
@@ -40,16 +44,26 @@ CROSSED = sample([*PACKINGS], 1)
 """The versions of FMI in which it is built for all systems."""
 
 
-def built(folder: Path, version: int, systems: str = "all") -> Path:
+def built(folder: Path, version: int, systems: str) -> Path:
     slaves = builder.slaves_named(str(EXAMPLES / "double_integrator" / MODEL))
     (path,) = builder.build_slaves(slaves, folder, packing=PACKINGS[version], systems=systems)
     return path
 
 
+def crossed_once(slave: Target, version: int, systems: str) -> Path:
+    """An FMU for other systems, kept until its sources or zig change."""
+    folder = kept("crossed", str(slave), str(version), systems, importlib.metadata.version("ziglang"))
+    path = folder / f"{slave.model}.fmu"
+    if read_source_hash(path) != PACKINGS[version].source_hash(slave):
+        builder.build_slaves([slave], folder, packing=PACKINGS[version], systems=systems)
+    return path
+
+
 @pytest.fixture(scope="module")
-def crossed(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+def crossed() -> dict[int, Path]:
     """A small slave for all systems, by the version of FMI."""
-    return {version: built(tmp_path_factory.mktemp(f"fmi{version}"), version) for version in CROSSED}
+    (slave,) = builder.slaves_named(str(EXAMPLES / "double_integrator" / MODEL))
+    return {version: crossed_once(slave, version, "all") for version in CROSSED}
 
 
 def libraries(fmu: Path) -> dict[str, bytes]:
@@ -157,9 +171,9 @@ def test_two_builds_of_a_library_are_the_same_bytes(crossed: dict[int, Path], tm
 
 @needs_zig
 @pytest.mark.parametrize("version", CROSSED)
-def test_on_linux_a_plant_flies_to_the_bytes_of_the_one_that_cc_compiles(version: int, tmp_path: Path) -> None:
+def test_on_linux_a_plant_flies_to_the_bytes_of_the_one_that_cc_compiles(version: int) -> None:
     plant, packing = "QuadrotorPlant", PACKINGS[version]
-    (crossed,) = builder.build([plant], tmp_path, packing=packing, systems="linux64")
+    crossed = crossed_once(Target.parse(MODELS[plant]), version, "linux64")
     here = fmus.locate(f"{packing.folder}/{plant}")
     mine, others = (fmpy.simulate_fmu(str(path), stop_time=1.0, output_interval=0.01) for path in (crossed, here))
     assert len(mine) == 101

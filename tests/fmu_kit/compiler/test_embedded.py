@@ -2,6 +2,7 @@
 
 import functools
 import re
+import shutil
 import zlib
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from tests.fmus.expected import COMMAND
 from tests.fmus.instance import Instance
 from tests.fmus.loop import MOTION, Loop
 from tests.fmus.making import PAIR
+from tests.native import kept
 
 H, STEPS = 0.01, tries(500, sampled=200)
 FLOWN = {"mass": 1.1, "wind.amplitude.x": 0.5, "initial.position.x": 0.3}
@@ -51,11 +53,20 @@ TOLERANCES = {
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The sources of both sides, and of the controller in single precision."""
-    double, single = tmp_path_factory.mktemp("double"), tmp_path_factory.mktemp("single")
+    """The sources of both sides, and of the controller in single precision; kept while what makes them is the same."""
     targets = {name: Target.parse(text) for name, text in PAIR.items()}
-    written = {name: write(target, double) for name, target in targets.items()}
-    return {**written, "single": write(targets["UnifiedController"], single, single=True)}
+    asked = {
+        **{name: (target, False) for name, target in targets.items()},
+        "single": (targets["UnifiedController"], True),
+    }
+    found = {}
+    for name, (target, single) in asked.items():
+        folder = kept("exported", name, builder.NATIVE.source_hash(target))
+        if not (folder / f"{target.model}.c").is_file():
+            write(target, folder, single=single)
+        own = shutil.copytree(folder, tmp_path_factory.mktemp(name) / "own")  # where it is compiled
+        found[name] = own / f"{target.model}.c"
+    return found
 
 
 def native(name: str) -> Instance:

@@ -241,6 +241,7 @@ def test_flags_go_before_the_scenario_file(main: Main, here: Path) -> None:
     assert scenario.plant.parameters == {"mass": 1.1}
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_out_keeps_the_run_and_its_figures(main: Main, here: Path) -> None:
     done = main("run", *SHORT, "--json", "--out", "results/first")
     printed = json.loads(done.stdout)

@@ -6,6 +6,7 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
+from fmu_kit.archive import read_source_hash
 from orchestration.command.variant_flags import VariantFlags
 from orchestration.components.building import builder, fmus
 from orchestration.components.checks.validation.validator import validate
@@ -17,6 +18,7 @@ from orchestration.simulation.interop.table import TOLERANCE
 from quadcosim import Result, Scenario, UsageError, run
 from tests.commands import Main
 from tests.extent import sample
+from tests.native import kept
 from tests.orchestration.simulation.interop.common import LOOP, farthest
 
 MAKINGS = {"native": builder.NATIVE, "python": builder.IN_PYTHON, "FMI 3": builder.NATIVE_FMI_3}
@@ -32,14 +34,16 @@ CRAZYFLIE = {**load_vehicle("crazyflie", Path()).for_controller("UnifiedControll
 
 
 @pytest.fixture(scope="module", params=sample([*MAKINGS], 1))
-def fixed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fixed(request: pytest.FixtureRequest) -> Path:
     """A redesign for one period and one vehicle, as an FMU of each making in turn."""
     flags = VariantFlags(
         set=[f"{key}={value}" for key, value in REDESIGN.items()], vehicle="crazyflie", name="Redesign"
     )
     slaves = flags.applied_to(builder.slaves_named("UnifiedController"))
-    (path,) = builder.build_slaves(slaves, tmp_path_factory.mktemp("fixed"), packing=MAKINGS[request.param])
-    return path
+    folder, packing = kept("fixed", request.param), MAKINGS[request.param]
+    if read_source_hash(folder / "Redesign.fmu") != packing.source_hash(slaves[0]):
+        builder.build_slaves(slaves, folder, packing=packing)
+    return folder / "Redesign.fmu"
 
 
 def run_of(controller: str, **parameters: float | str) -> Result:

@@ -19,6 +19,7 @@ from orchestration.quadrotor.flight.hover import COORDINATES, hover_of
 from orchestration.quadrotor.flight.hover_loop import controller_at_hover, located
 from quadcosim import FmuChoice, Scenario, UsageError
 from tests.commands import Main
+from tests.pictures import blank_pictures
 
 FILE = """
 name = "small"
@@ -62,7 +63,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def table(folder: Path, module_main: Main) -> str:
     """What the command prints."""
     command = ("compare", folder / "small.toml", "--native", "--format", "png", "--out", folder / "out")
-    return module_main(*command).stdout
+    with blank_pictures():
+        return module_main(*command).stdout
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +119,7 @@ def test_nothing_is_run_twice_and_the_result_stays(table: str, folder: Path, mai
     assert (folder / "out" / "cells.csv").read_bytes() == before
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
     native = replace(quadcosim.load_comparison(folder / "small.toml"), native=True)
     found = quadcosim.compare(native, out=folder / "out", figures=False, progress=None, announce=None)
@@ -260,6 +263,7 @@ position = 1.0
 )
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
     tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
