@@ -284,6 +284,7 @@ def _value(text: str) -> Any:
     except ValueError:
         return text
     with suppress(ValueError):
-        if 2**53 <= abs(whole := int(text)) < 2**64:
+        whole = int(text)
+        if 2**53 <= abs(whole) < 2**63 or (abs(whole) < 2**64 and whole != int(number)):
             return whole  # as in a file: whether a float holds it, where that counts, is for the variable to say
     return number

@@ -1,6 +1,6 @@
 """One FMU for model exchange about its start: ẋ = A x + B u, y = C x + D u."""
 
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from orchestration.components.fmi.adapted import AdaptedInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import Model, declared_of, read_model
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.number_text import some
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
@@ -17,8 +17,11 @@ from orchestration.simulation.runs.prepared import set_parameters
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.linearise import in_isolation
 
-STEP = 6e-6
-"""Change of a state or an input for a central difference, of its size or nominal value"""
+STEP, STEP_OF_SINGLE = 6e-6, 5e-3
+"""Change of a state or an input for a central difference, of its size or nominal value; of one in single precision"""
+AGREE = 1e-3
+"""Difference to it, of the largest of an unknown, up to which a directional derivative is believed: an FMU may have
+none of outputs that are states, and say 0"""
 AT_REST = 1e-6
 """Rate of a state at rest at most, as a share of its size or nominal value each second"""
 
@@ -59,8 +62,8 @@ class PlantAtStart:
 def plant_at_start(request: RequestLike) -> PlantAtStart:
     """The matrices of one FMU about its start values and parameters.
 
-    By its directional derivatives, or else by central differences of its derivatives and outputs. Raises `UsageError`
-    for an FMU that does not offer model exchange, which has no derivatives.
+    By central differences of its derivatives and outputs, and by its directional derivatives where they agree. Raises
+    `UsageError` for an FMU that does not offer model exchange, which has no derivatives.
     """
     return in_isolation(request, _plant_at_start, None)
 
@@ -94,10 +97,15 @@ def _about(instance: AdaptedInstance) -> PlantAtStart:
     instance.reader(knowns, point)()
     instance.reader(unknowns, values)()
     start = point.copy()
-    found = instance.slopes(unknowns, knowns) if knowns and unknowns else np.zeros((len(unknowns), len(knowns)))
     sizes = np.maximum(np.abs(start), [abs(model.variables[name].nominal or 1.0) for name in knowns])
-    if found is None:
-        found = _differences(instance, unknowns, inputs, start, STEP * sizes)
+    single = [model.variables[name].type == "Float32" for name in knowns]
+    steps = np.where(single, STEP_OF_SINGLE, STEP) * sizes
+    found = _differences(instance, unknowns, inputs, start, steps)
+    with suppress(SimulatorError):  # differences are enough
+        slopes = instance.slopes(unknowns, knowns) if found.size else None
+        if slopes is not None:
+            scale = np.abs(found).max(axis=1, keepdims=True)
+            found = np.where(np.abs(slopes - found) <= AGREE * scale, slopes, found)
     n, moving = len(states), np.abs(values[: len(states)]) > AT_REST * sizes[: len(states)]
     return PlantAtStart(
         name=model.name, A=found[:n, :n], B=found[:n, n:], C=found[n:, :n], D=found[n:, n:],
@@ -127,6 +135,9 @@ def _differences(
             ends.append((into.copy(), point[i]))
         (high, above), (low, below) = ends
         columns.append((high - low) / (above - below))
+    given[:] = start[count:]
+    write()
+    instance.set_states(start[:count])
     found: Floats = np.array(columns, dtype=np.float64).reshape(len(start), len(unknowns)).T
     return found
 

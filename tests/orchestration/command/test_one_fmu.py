@@ -174,6 +174,8 @@ def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_fr
     for number in (2**53 + 1, 2**63 - 1):
         refused = main("run", fmu, "--in-process", "--set", f"big={number}", code=2).stderr
         assert f"big = {number}: expected a whole number that a float holds" in refused
+    refused = main("run", fmu, "--in-process", "--set", f"big={2**63}", code=2).stderr  # a float that UInt64 takes
+    assert f"big = {2**63}: expected a whole number of 64 bits" in refused
     inputs.write_text(f"time,big\n0,1\n1,{2**53 + 1}\n")
     refused = main("run", fmu, "--in-process", "--inputs", inputs, code=2).stderr
     assert "big.csv: line 3: big: expected a whole number that a float holds" in refused

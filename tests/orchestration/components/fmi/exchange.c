@@ -99,13 +99,13 @@ static int enter(Model *m, int from, int to) {
     m->mode = to;
     return 0;
 }
-/* Of curves and the integrator; count says how often. */
+/* Of curves and the integrator, but not of its outputs that are states; count says how often. */
 static int differentiate(Model *m, const uint32_t *of, size_t n, uint32_t r, double seed, double *out) {
     m->count++;
     for (size_t i = 0; i < n; i++) {
         if (m->kind == CURVE) out[i] = seed * (r == U ? 3 * m->v[P] * m->v[U] * m->v[U] : 2 * m->v[Q] * m->v[W]);
         else if (of[i] == Y) out[i] = seed * (r == U ? m->v[P] : r == W ? m->v[Q] : r == X1);
-        else out[i] = seed * (of[i] == r || (of[i] == DX1 && r == X2) || (of[i] == DX2 && r == U));
+        else out[i] = seed * ((of[i] == DX1 && r == X2) || (of[i] == DX2 && r == U));
     }
     return m->mode == 2 || !m->mode ? 0 : 3;
 }
