@@ -33,7 +33,7 @@ def gain_limits(factors: Array, ends: Mapping[str, Mapping[str, Array]], local: 
             panel.plot(
                 factors, 1e3 * end[fate], f"{marker}-", color=color, markersize=6, alpha=0.8, label=symbols(name)
             )
-        panel.set(title=f"{fate} up to", xlabel=symbols("factor on k_η, k_θ and k_q [1]"))
+        panel.set(title=f"{fate} up to", xlabel=symbols("factor on k_η, k_θ and k_q"))
         _ticks(panel, factors[::2], (5, 10, 20, 40, 80, 160, 320))
     panels[0].set_ylabel("period [ms]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
@@ -70,9 +70,7 @@ def decay(curves: Mapping[float, tuple[Array, Array]], medians: Array) -> Figure
                    label=f"{1e3 * high:g} to {1e3 * low:g} mm")  # fmt: skip
     expected = [theory.expected_rate(exponent) for exponent in theory.EXPONENTS]
     right.plot(theory.EXPONENTS, expected, "-", color=GREY, label=symbols("2k/(3 + β_t)"))
-    right.set(
-        xlabel=symbols("exponent of the surface β_t [1]"), ylabel="rate of the error at 1 ms [1/s]", ylim=(0.0, 2.0)
-    )
+    right.set(xlabel=symbols("exponent of the surface β_t"), ylabel="rate of the error at 1 ms [1/s]", ylim=(0.0, 2.0))
     left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3)
     right.legend(title="median over the starts", loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
     return figure
@@ -85,7 +83,7 @@ def loop_gains(found: Mapping[str, Array]) -> Figure:
     for panel, names in zip(panels, (tuple(theory.GAINS), ("attitude", "translation")), strict=True):
         for name, color, marker in zip(names, (RED, ORANGE, GREY, BLUE, "black"), "osv^x"):
             panel.plot(theory.FACTORS, 1e3 * found[name], f"{marker}-", color=color, markersize=5, label=symbols(name))
-        panel.set_xlabel("factor on the gain [1]")
+        panel.set_xlabel("factor on the gain")
         _ticks(panel, (0.25, 0.5, 1.0, 2.0, 4.0), (20, 40, 80, 160, 320))
     alone = [1e3 * theory.of_attitude_alone(*(15.0 * factor,) * 3) for factor in theory.FACTORS]
     panels[1].plot(theory.FACTORS, alone, "--", color=GREY, label="attitude loop by itself")

@@ -173,7 +173,7 @@ def figure() -> Figure:
                 label=name.replace("`", ""),
             )
         panel.set(xscale="log", xlabel="share of the processor [%]", title=f"that {word}", xlim=(0.003, 5.0))
-    panels[0].set_ylabel("share of 200 initial conditions [1]")
+    panels[0].set_ylabel("share of 200 initial conditions")
     made.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return made
 

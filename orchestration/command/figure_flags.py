@@ -53,15 +53,17 @@ class FigureFlags:
 
     @property
     def _extent(self) -> dict[str, Any]:
+        captioned = {} if self.style == "slides" else {"has_titles": False}  # as what has its place in a document is
         if self.size is not None:
             width, cross, height = self.size.lower().partition("x")
             return {
                 "width": _millimetres("--size", self.size, width),
                 "height": _millimetres("--size", self.size, height if cross else ""),
+                **captioned,
             }
         if self.width is None:
             return {}
-        return {"width": COLUMNS.get(self.width) or _millimetres("--width", self.width, self.width)}
+        return {"width": COLUMNS.get(self.width) or _millimetres("--width", self.width, self.width), **captioned}
 
 
 def _millimetres(flag: str, argument: str, text: str) -> float:

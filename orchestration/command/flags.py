@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from orchestration.systems.system.model import System
     from orchestration.systems.system.request import Request
 
-TIMING, EFFECTS, MODEL = "Timing", "Disturbances of the loop", "Model"
+TIMING, EFFECTS, MODEL = (
+    f"Quadrotor only: {of}; of a system --set" for of in ("timing", "disturbances of the loop", "model")
+)
 _of_model = partial(option, panel=MODEL)
 
 
@@ -36,7 +38,7 @@ def _of_record(
     name: str,
     key: str,
     *,
-    panel: str,
+    panel: str | None = None,
     metavar: str = "SECONDS",
     words: Any = None,
     tells_default: bool = False,
@@ -81,10 +83,8 @@ class FlightFlags:
     clock_ratio: Annotated[float | None, _of_timing("clock_ratio", metavar="R")] = None
     noise: Annotated[list[str] | None, _of_timing("noise", metavar="NAME=SIGMA", repeated=True)] = None
     quantisation: Annotated[list[str] | None, _of_timing("quantisation", metavar="NAME=Q", repeated=True)] = None
-    seed: Annotated[int | None, _of_record("scenario", "Scenario", "seed", panel=EFFECTS, metavar="N")] = None
-    stop_time: Annotated[
-        float | None, _of_record("scenario", "Scenario", "stop_time", panel=MODEL, tells_default=True)
-    ] = None
+    seed: Annotated[int | None, _of_record("scenario", "Scenario", "seed", metavar="N")] = None
+    stop_time: Annotated[float | None, _of_record("scenario", "Scenario", "stop_time", tells_default=True)] = None
     model_mismatch: Annotated[
         bool | None, _of_record("scenario", "Scenario", "model_mismatch", panel=MODEL, metavar="")
     ] = None
@@ -133,14 +133,15 @@ class FlightFlags:
     ] = None
     native: Annotated[
         bool | None,
-        _of_model("--native", "Use native twins (no Python inside) of FMUs with sources here; built if need be.", ""),
+        option("--native", "Use native twins (no Python inside) of FMUs with sources here; built if need be.", ""),
     ] = None
     set: Annotated[
         list[str] | None,
-        _of_model(
+        option(
             "--set",
-            "A parameter, as controller.NAME=V, or of a system file a value by its path; may be repeated.",
-            "SIDE.NAME=V",
+            "A value by its path: of the quadrotor controller.NAME=V, of a system as connections.NAME.delay=V; may be "
+            "repeated.",
+            "PATH=V",
         ),
     ] = None
 

@@ -24,7 +24,10 @@ def new(
     in_c: Annotated[bool, option("--c", "A controller in C, and the file by which it is wrapped.")] = False,
     out: Annotated[Path, option("--out", "Folder in which it is written; default: this one.", "DIR")] = Path(),
 ) -> CommandResult:
-    """Write a folder NAME: a law in a few lines, its test, a system that uses it, a page of commands."""
+    """Write a folder NAME: a law for the quadrotor (controller), or for a plant of your own, or a filter; its test.
+
+    It has a system that uses it, and a page of commands.
+    """
     from orchestration.components.scaffold.folder import Kind, git_author, write
 
     kinds = {each: each for each in get_args(Kind)}

@@ -46,9 +46,9 @@ def basins(by_size: Mapping[str, BySize], axis: Quantity, fate: str, title: str,
         cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
         cells.name_cells(panel, axis.of(values))
         panel.set_title(name)
-    figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s [1]")
+    figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s")
     figure.supxlabel(axis.title)
-    figure.supylabel("size of the initial error [1]")
+    figure.supylabel("size of the initial error")
     style.set_title(figure, _joined(title, f"above the white line less than half of the starts {fate}"))
     return figure
 
@@ -88,10 +88,10 @@ def shares(
             handles=handles, loc="center" if len(figure.axes) > len(by_title) else "outside right center"
         )
         figure.supxlabel(axis.title)
-        figure.supylabel("share of the starts [1]")
+        figure.supylabel("share of the starts")
     else:
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-        panels[0].set(xlabel=axis.title, ylabel="share of the starts [1]")
+        panels[0].set(xlabel=axis.title, ylabel="share of the starts")
     return figure
 
 

@@ -193,7 +193,7 @@ def spectral_radius(result: Limit, values: Floats, radii: Floats, style: Style =
         if limit is not None:
             at = across.factor * limit
             panel.axvline(at, color=color, linestyle=dashes, label=f"{name}  {across.text_of(limit, DIGITS)}")
-    panel.set(xlabel=across.title, ylabel="spectral radius about hover [1]")
+    panel.set(xlabel=across.title, ylabel="spectral radius about hover")
     panel.margins(x=0)
     if panel.get_legend_handles_labels()[0]:
         panel.legend()

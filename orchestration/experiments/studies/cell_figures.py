@@ -217,7 +217,7 @@ def _difference(
 
 def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str:
     if metric == GOOD:
-        return f"share of {words[0]} runs [1]"
+        return f"share of {words[0]} runs"
     return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}"
 
 

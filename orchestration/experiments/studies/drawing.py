@@ -84,7 +84,7 @@ def study_figures(
         else:
             drawn = _over_axes(study, table, metric, units, style)
         for figure in drawn.values():
-            figures.add_note(figure, note)
+            figures.add_note(figure, note, style)
     return drawn, indices
 
 

@@ -153,7 +153,7 @@ def sensitivity_bars(indices: "list[Index]", metric: str, style: Style = SCREEN)
     panel.set(
         yticks=np.arange(len(axes)) + height * (len(kinds) - 1) / 2,
         yticklabels=[labels.setting(axis) for axis in axes],
-        xlabel=f"index of sensitivity [1]: {_OF.get(metric, labels.metric(metric))}",
+        xlabel=f"index of sensitivity: {_OF.get(metric, labels.metric(metric))}",
     )
     panel.invert_yaxis()
     figure.legend(loc="outside right upper")
@@ -165,9 +165,9 @@ def good_runs(table: "pd.DataFrame") -> "pd.Series":
     return table["good"].eq(1).fillna(False).astype(bool)
 
 
-def add_note(figure: Figure, note: str | None) -> None:
-    """Write a note above a figure, below its title, if there is one."""
-    if note is not None:
+def add_note(figure: Figure, note: str | None, style: Style) -> None:
+    """Write a note above a figure, below its title; a paper has its caption for both."""
+    if note is not None and style.has_titles:
         figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), note))), size="medium")
 
 
@@ -180,7 +180,7 @@ def made(make: Callable[[Style], Figure], style: Style, *, note: str | None) -> 
     """A figure in a style, with a note."""
     with style.applied():
         figure = make(style)
-        add_note(figure, note)
+        add_note(figure, note, style)
     return figure
 
 

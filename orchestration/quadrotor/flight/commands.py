@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from orchestration.quadrotor.scenarios.measures import saturated
 from orchestration.quadrotor.scenarios.wiring import COMMAND
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window, title
-from orchestration.simulation.figures.lines import TIME, clip_peaks, draw_line, legend_of_runs, quantity, set_span
+from orchestration.simulation.figures.lines import TIME, clip_peaks, draw_line, legend_of_runs, set_span
 from orchestration.simulation.figures.palette import BLACK, GREEN, GREY, ORANGE, PURPLE, RED
 from orchestration.simulation.figures.style import Style
+from orchestration.simulation.results import display_names as labels
 
 NAMES = dict(zip(COMMAND, ("thrust", "torque x", "torque y", "torque z"), strict=True))
 UNITS = dict(zip(COMMAND, ("N", "N.m", "N.m", "N.m"), strict=True))
@@ -36,7 +37,7 @@ def commands(runs: Sequence[DrawnRun], style: Style) -> Figure:
             _draw(panel, runs, name, span, style, clips=not is_zoom, beside=zoom if len(spans) > 1 else None)
             if is_zoom and len(runs) == 1:
                 mark_events(panel, runs[0], span)
-        row[0].set_ylabel(quantity(NAMES[name], UNITS[name]))
+        row[0].set_ylabel(labels.with_unit(NAMES[name], UNITS[name]))
         if len(spans) > 1 and window is not None:
             row[0].axvspan(*zoom, color=GREY, alpha=0.15, linewidth=0.0)
     for panel in rows[-1]:

@@ -14,6 +14,7 @@ from orchestration.simulation.figures import lines
 from orchestration.simulation.figures.drawn_run import DrawnRun
 from orchestration.simulation.figures.palette import BLUE, GREEN, RED
 from orchestration.simulation.figures.style import Style
+from orchestration.simulation.results import display_names as labels
 
 AXES = tuple(zip("xyz", (BLUE, RED, GREEN), ("-", "--", "-."), strict=True))
 
@@ -38,7 +39,7 @@ def errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
                 norm = lines.positive(np.linalg.norm(values, axis=1))
                 lines.draw_line(panel, run.time, norm, color=run.color, linestyle=run.dashes, label=run.name)
         lines.logarithmic(panel)
-        panel.set_ylabel(lines.wrapped(lines.quantity(f"{error.name}, norm", error.unit)))
+        panel.set_ylabel(lines.wrapped(labels.with_unit(f"{error.name}, norm", error.unit)))
         panel.minorticks_off()
         lines.set_time_axis(panel, runs)
     return figure
@@ -83,7 +84,7 @@ def draw_components(panel: Axes, run: DrawnRun, error: Error, style: Style, *, c
     assert values is not None
     for k, (axis, color, dashes) in enumerate(AXES):
         lines.draw_line(panel, run.time, values[:, k], color=color, linestyle=dashes, label=axis)
-    panel.set_ylabel(lines.wrapped(lines.quantity(error.name, error.unit)))
+    panel.set_ylabel(lines.wrapped(labels.with_unit(error.name, error.unit)))
     lines.set_time_axis(panel, [run])
     if clips:
         lines.clip_peaks(panel, [(run.time, values[:, k]) for k in range(3)], error.unit, style)
@@ -100,7 +101,7 @@ def _overlaid(runs: Sequence[DrawnRun], style: Style) -> Figure:
             for run, values in drawn:
                 lines.draw_line(panel, run.time, values, color=run.color, linestyle=run.dashes, label=run.name)
             lines.set_time_axis(panel, runs)
-            panel.set_ylabel(lines.wrapped(lines.quantity(f"{error.name} {'xyz'[k]}", error.unit), 18))
+            panel.set_ylabel(lines.wrapped(labels.with_unit(f"{error.name} {'xyz'[k]}", error.unit), 18))
             if i == len(available) - 1:
                 panel.set_xlabel(lines.TIME)
     lines.legend_of_runs(figure, runs, style)

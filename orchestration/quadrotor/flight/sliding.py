@@ -17,11 +17,11 @@ from orchestration.simulation.figures.lines import (
     logarithmic,
     name_runs,
     positive,
-    quantity,
     set_time_axis,
 )
 from orchestration.simulation.figures.palette import GREY
 from orchestration.simulation.figures.style import Style
+from orchestration.simulation.results import display_names as labels
 
 ERROR, RATE = (tuple(f"controller.{c}" for c in components(name)) for name in ("position_error", "velocity_error"))
 
@@ -38,7 +38,10 @@ def phase(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
         for run in with_errors:
             _draw(panel, run, run[ERROR[k]], run[RATE[k]], alone=len(runs) == 1)
         _draw_surfaces(panel, with_errors)
-        panel.set(xlabel=quantity(f"position error {axis}", "m"), ylabel=quantity(f"velocity error {axis}", "m/s"))
+        panel.set(
+            xlabel=labels.with_unit(f"position error {axis}", "m"),
+            ylabel=labels.with_unit(f"velocity error {axis}", "m/s"),
+        )
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(names))
     name_runs(figure, runs, style)
@@ -100,7 +103,7 @@ def energy(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
         panel.plot(run.time[at], positive(run[COLUMN][at]), color=run.color, linestyle=run.dashes, label=run.name)
     unit = with_energy[0].described[COLUMN].unit
     logarithmic(panel)
-    panel.set(xlabel=TIME, ylabel=quantity("energy L", unit))
+    panel.set(xlabel=TIME, ylabel=labels.with_unit("energy L", unit))
     set_time_axis(panel, runs)
     if style.has_titles:
         panel.set_title(title(runs))

@@ -96,11 +96,6 @@ def abreast(names: Sequence[str], style: Style, *, width: float = 1.0) -> int:
     return min(len(names), max(1, int(width * style.width / (0.5 * longest * style.font * 0.353))))
 
 
-def quantity(name: str, unit: str | None) -> str:
-    """The label of an axis; a dimensionless quantity has [1]."""
-    return f"{name} [1]" if unit == "1" else labels.with_unit(name, unit)
-
-
 def wrapped(label: str, width: int = 24) -> str:
     """A label broken into lines of `width` characters, its unit never alone on a line."""
     return "\n".join(textwrap.wrap(label.replace(" [", "\u00a0["), width, break_long_words=False))

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.drawn_run import DrawnRun
-from orchestration.simulation.figures.lines import TIME, abreast, draw_line, name_runs, quantity, set_time_axis, wrapped
+from orchestration.simulation.figures.lines import TIME, abreast, draw_line, name_runs, set_time_axis, wrapped
 from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, MAX_PANELS
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
@@ -45,7 +45,7 @@ def _in_panels(available: Sequence[Panel], runs: Sequence[DrawnRun], style: Styl
     for panel, (name, unit, columns) in zip(panels, contents):
         for run in runs:
             _draw(panel, run, columns, alone=len(runs) == 1)
-        panel.set_ylabel(wrapped(quantity(labels.quantities(labels.words(name), columns), unit), 16))
+        panel.set_ylabel(wrapped(labels.with_unit(labels.quantities(labels.words(name), columns), unit), 16))
         set_time_axis(panel, runs)
         handles, names = panel.get_legend_handles_labels()
         panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))

@@ -200,7 +200,7 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
     panel = figure.axes[0]
     assert [line.get_label() for line in panel.get_lines()] == list(LAWS.values or ())
     assert len(panel.collections) == 2
-    assert panel.get_ylabel() == "share of settled runs [1]"
+    assert panel.get_ylabel() == "share of settled runs"
 
 
 def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:

@@ -68,6 +68,9 @@ def inset(axes: Axes) -> Any:
 # -- names and units --------------------------------------------------------------------------------------
 
 
+DIMENSIONLESS = ("attitude error", "quaternion", "valve")
+
+
 def unlabelled(figure: Figure) -> list[str]:
     """Axes along the left and below whose label has no name or no unit."""
     found = []
@@ -77,7 +80,9 @@ def unlabelled(figure: Figure) -> list[str]:
         labels = [axes.get_xlabel()] if place.is_last_row() or axes.get_xlabel() else []
         labels += [axes.get_ylabel()] if place.is_first_col() or axes.get_ylabel() else []
         labels += [axes.get_zlabel()] if axes.name == "3d" else []  # type: ignore[attr-defined]
-        found += [label for label in labels if not (len(label) > 4 and label.endswith("]") and "_" not in label)]
+        named = [len(label) > 4 and "_" not in label for label in labels]
+        has_unit = [label.endswith("]") or label.startswith(DIMENSIONLESS) for label in labels]
+        found += [label for label, *ok in zip(labels, named, has_unit, strict=True) if not all(ok)]
     return found
 
 
@@ -129,7 +134,7 @@ def test_signals_of_any_system_share_a_panel_by_unit_and_none_is_left_out_up_to_
     figure = draw(result)["signals"]
     figure.draw_without_rendering()
     labels = [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
-    measured = ("position [m]", "velocity [m/s]", "quaternion [1]", "angular velocity [rad/s]")
+    measured = ("position [m]", "velocity [m/s]", "quaternion", "angular velocity [rad/s]")
     commanded = ("thrust [N]", "torque [N·m]")
     assert labels == [*(f"measurement: {name}" for name in measured), *(f"command: {name}" for name in commanded)]
     assert sum(len(axes.get_lines()) for axes in figure.axes) == sum(len(x.start) for x in whole.connections)
