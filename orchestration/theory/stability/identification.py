@@ -29,7 +29,7 @@ SAMPLES = 32
 FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""
 SHRUNK = (1.0, 0.3, 0.1)
-"""Factors on large pulses"""
+"""Factors on the pulses, tried in turn"""
 FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
@@ -58,16 +58,16 @@ class SampledRest:
     def tangent(self) -> Tangent | LiftedTangent:
         """Its tangent; of several rates that of its samples together.
 
-        Its pulses are chosen one sample at a time, beginning with sample 0, at which all of its tasks run. Raises
-        `UsageError` as `Tangent`.
+        Its pulses are chosen with each input moved over all of these samples, as one alone may pass its tasks by.
+        Raises `UsageError` as `Tangent`.
         """
-        sample, samples, rest = Rung(1, self.period), self.samples, self.rest
+        samples, rest = self.samples, self.rest
         if samples == 1:
-            return _tangent(self.excitation, sample, self.count)
+            return _tangent(self.excitation, Rung(1, self.period), self.count)
         rest.fmu.restore(self.excitation.rest.saved)
         excitation = Excitation(rest)
         rungs = max(FEWEST_LIFTED, SAMPLES // samples)
-        count = _choose_pulse(excitation, [sample] * (2 * rungs * samples), self.factor) // samples
+        count = _choose_pulse(excitation, [Rung(samples, self.period)] * (2 * rungs), self.factor)
         rest.fmu.restore(excitation.rest.saved)
         fmu = LiftedInstance(rest, samples, self.period)
         lifted = Excitation(lifted_rest(rest, fmu, samples))
@@ -106,8 +106,6 @@ def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
         tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
         return tangent
 
-    if not excitation.is_coarse:
-        return proved(excitation)
     found, refused = list[Tangent](), list[UsageError]()
     for factor in SHRUNK:  # all inputs at once may lead where the component saturates
         smaller = copy(excitation)
@@ -119,7 +117,7 @@ def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
         except UsageError as error:
             refused.append(error)
     if not found:
-        raise ImpreciseError(str(refused[0]))
+        raise (ImpreciseError if excitation.is_coarse else UsageError)(str(refused[0]))
     return min(found, key=lambda one: one.accuracy)
 
 

@@ -138,6 +138,24 @@ def test_a_component_of_several_rates_is_pulsed_at_one_sample_to_choose_and_what
     assert responses(measured, 9) == pytest.approx(responses(Alternating(3), 9), abs=1e-8)
 
 
+class Cascaded(Alternating):
+    """One whose slow task, which is not due at the first sample, moves it most; rounded at the last digit of 0.5."""
+
+    turn = 1
+
+    def step(self, t: float, h: float) -> None:
+        gain = 0.6 if self.turn == 0 else 0.012
+        self.kept = np.concatenate([[0.5 + gain * self.u], 0.5 + 0.9 * (self.kept[:-1] - 0.5)])
+        self.turn = (self.turn + 1) % 4
+
+
+def test_pulses_of_a_component_of_several_rates_are_chosen_for_all_of_its_tasks() -> None:
+    fmu = Cascaded(3)
+    fmu.kept += 0.5
+    found = of_samples(rest(fmu), 1.0, 1.0).tangent()
+    assert responses(found, 6) == pytest.approx([0.0, 0.0, 0.012 * 0.81, 0.0, 0.0, 0.0], abs=1e-9)
+
+
 class Drifting(Line):
     """One that responds by a little more from sample to sample."""
 
