@@ -1,11 +1,15 @@
-"""Structures and constants that C and Python share, parsed from the text of C that declares them."""
+"""C that Python calls: libraries, compiled once, and the structures and constants that both share, from its text."""
 
 import ctypes
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from fmu_kit.bundle import PackagingError
+from fmu_kit.compiler.pack.c_compiler import OPTIONS, Mathematics, compiled_here
+from fmu_kit.libraries import cached_library
 from orchestration.foundation.basics.errors import QuadcosimError
 
 if TYPE_CHECKING:
@@ -21,6 +25,24 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _FUNCTION = re.compile(r"(\w+) \(\*(\w+)\)\((.*)\)")
 _FIELDS = re.compile(r"(?:const )?(\w+) (.*)", re.DOTALL)
 _FIELD = re.compile(r"(\**)(\w+)(?:\[(.*)\])?")
+
+
+@contextmanager
+def compiler_errors() -> Iterator[None]:
+    """Errors of a compiler, or of the cache of what it makes, as `QuadcosimError`."""
+    try:
+        yield
+    except (PackagingError, OSError) as error:
+        raise QuadcosimError(str(error)) from error
+
+
+def compiled_library(
+    name: str, sources: Mapping[str, bytes], *, mathematics: Mathematics = "own", options: Sequence[str] = ()
+) -> Any:
+    """The library that is compiled from NAME.c among the sources, once; raises `QuadcosimError` with the reason."""
+    with compiler_errors():
+        compiled = lambda: compiled_here(sources, f"{name}.c", mathematics=mathematics, options=options)  # noqa: E731
+        return ctypes.CDLL(str(cached_library(name, sources, (*OPTIONS, *options), compiled)))
 
 
 def address(array: "npt.NDArray[Any]") -> int:

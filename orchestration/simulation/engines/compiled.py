@@ -13,13 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
 from fmu_kit.compiler.runtime import FOLDER
-from fmu_kit.libraries import cached_library
 from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.surroundings import ROUNDING
-from orchestration.foundation.basics.c_structures import address, declared, expect_same_sizes
+from orchestration.foundation.basics.c_structures import address, compiled_library, declared, expect_same_sizes
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.foundation.basics.times import seconds
@@ -44,11 +41,7 @@ def library() -> Any:
     """The function `run` of loop.c; raises `QuadcosimError` with the reason if it is not available."""
     sources = {path.name: path.read_bytes() for path in FILES}
     sources["operators.h"] = condition.operators().encode()
-    try:
-        path = cached_library("loop", sources, OPTIONS, lambda: compiled_here(sources, "loop.c", mathematics="libm"))
-        loaded = ctypes.CDLL(str(path))
-    except (PackagingError, OSError) as error:
-        raise QuadcosimError(str(error)) from error
+    loaded = compiled_library("loop", sources, mathematics="libm")
     expect_same_sizes(loaded, {**shared(1), "Operation": Operation})
     run = loaded.run
     run.restype = ctypes.c_int

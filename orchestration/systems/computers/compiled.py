@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
-from fmu_kit.libraries import cached_library
+from orchestration.foundation.basics.c_structures import compiled_library
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Constant
@@ -33,7 +31,6 @@ from orchestration.systems.computers.parts import (
 from orchestration.systems.computers.scheduler import Scheduler
 
 SOURCE = Path(__file__).with_name("scheduler.c")
-_FASTER = ("-O3",)
 _NO_MEMORY = -1
 """The result of C in place of a number of notes"""
 _ROOM = 4096
@@ -204,13 +201,7 @@ def _tables(
 def _library() -> Any:
     """scheduler.c as a library; raises `QuadcosimError`, naming the reason, if there is none."""
     sources = {"scheduler.c": SOURCE.read_bytes(), "constants.h": _constants().encode()}
-    try:
-        path = cached_library(
-            "scheduler", sources, (*OPTIONS, *_FASTER), lambda: compiled_here(sources, "scheduler.c", options=_FASTER)
-        )
-        library = ctypes.CDLL(str(path))
-    except (PackagingError, OSError) as error:
-        raise QuadcosimError(str(error)) from error
+    library = compiled_library("scheduler", sources, options=("-O3",))
     for name in ("size_of_arguments", "scheduler_next_instant", "scheduler_run"):
         getattr(library, name).restype = ctypes.c_int64
     library.scheduler_new.restype = ctypes.c_void_p

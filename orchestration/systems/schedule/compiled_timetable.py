@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
-from fmu_kit.libraries import cached_library
-from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
+from orchestration.foundation.basics.c_structures import (
+    address,
+    compiled_library,
+    constants,
+    declared,
+    expect_same_sizes,
+)
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.systems.schedule.common_timetable import CommonTimetable, Instants, Span
@@ -49,13 +52,7 @@ def library() -> Any:
 
 def loaded(sources: dict[str, bytes]) -> Any:
     """Such a library from the texts of its files; raises as `library`."""
-    try:
-        path = cached_library(
-            "timetable", sources, OPTIONS, lambda: compiled_here(sources, "timetable.c", mathematics="libm")
-        )
-        made = ctypes.CDLL(str(path))
-    except (PackagingError, OSError) as error:
-        raise QuadcosimError(str(error)) from error
+    made = compiled_library("timetable", sources, mathematics="libm")
     expect_same_sizes(made, declared(HEADER.read_text(encoding="utf-8")))
     pointer, number = ctypes.c_void_p, ctypes.c_int64
     made.timetable_new.restype, made.timetable_new.argtypes = pointer, (pointer, pointer, number, pointer)

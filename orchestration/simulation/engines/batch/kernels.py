@@ -3,20 +3,19 @@
 import ctypes
 import functools
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fmu_kit import libraries
 from fmu_kit.archive import LANES_FOLDER
-from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiled_here
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS
 from fmu_kit.compiler.pack.lanes import MAIN, Lanes, compiled_lanes
 from fmu_kit.compiler.pack.lanes import preferred_lanes as lanes_of_fmus
 from fmu_kit.compiler.runtime import FOLDER
+from fmu_kit.libraries import cached_library
 from orchestration.components.fmi.read_description import Model
-from orchestration.foundation.basics.c_structures import expect_same_sizes
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.c_structures import compiled_library, compiler_errors, expect_same_sizes
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.compiled import INSTANTS
 from orchestration.simulation.engines.structures import HEADER, shared
 
@@ -27,10 +26,8 @@ _SOURCES = ("sources/", LANES_FOLDER)
 
 def preferred_lanes() -> int:
     """How many runs this machine computes at once in a thread; raises `QuadcosimError` without a compiler."""
-    try:
+    with compiler_errors():
         return lanes_of_fmus()
-    except PackagingError as error:
-        raise QuadcosimError(str(error)) from error
 
 
 def component(name: str, model: Model, lanes: int, *, several: bool) -> Lanes:
@@ -64,7 +61,8 @@ def _sources_in(path: Path, changed: int) -> Mapping[str, bytes]:
 def _compiled(sources: tuple[tuple[str, bytes], ...], lanes: int, several: bool) -> Lanes:
     key = (OPTIONS, FOR_THIS_PROCESSOR, lanes, several)
     compile_ = functools.partial(compiled_lanes, dict(sources), lanes, several=several)
-    return Lanes(_cached_library("lanes", dict(sources), key, compile_))
+    with compiler_errors():
+        return Lanes(cached_library("lanes", dict(sources), key, compile_))
 
 
 @functools.lru_cache(maxsize=256)
@@ -73,8 +71,7 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     sources = {path.name: path.read_bytes() for path in FILES}
     sources |= {"sizes.h": sizes.encode(), "expressions.h": expressions.encode()}
     options = (*FOR_THIS_PROCESSOR, f"-DQUADCOSIM_LANES={lanes}", "-Wno-psabi")
-    compile_ = lambda: compiled_here(sources, "batch.c", options=options)  # noqa: E731
-    library = ctypes.CDLL(str(_cached_library("batch", sources, (OPTIONS, options), compile_)))
+    library = compiled_library("batch", sources, options=options)
     expect_same_sizes(library, shared(lanes))
     for name in ("run", "proceed", "clear", "free_all"):
         if hasattr(library, name):
@@ -82,11 +79,3 @@ def batch(sizes: str, expressions: str, lanes: int) -> Any:
     library.values_of_reductions.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
     library.grown.argtypes = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
     return library
-
-
-def _cached_library(folder: str, sources: Mapping[str, bytes], how: Any, compiled: Callable[[], bytes]) -> Path:
-    """As `fmu_kit.libraries.cached_library`; raises `QuadcosimError` if it cannot be compiled or stored."""
-    try:
-        return libraries.cached_library(folder, sources, how, compiled)
-    except (PackagingError, OSError) as error:
-        raise QuadcosimError(str(error)) from error

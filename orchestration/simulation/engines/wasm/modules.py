@@ -4,12 +4,12 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fmu_kit import libraries
-from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.pack.c_compiler import Unit, linked_for_wasm
 from fmu_kit.compiler.pack.lanes import MAIN, USER_OBJECT
 from fmu_kit.compiler.runtime import FOLDER
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from fmu_kit.libraries import cached_library
+from orchestration.foundation.basics.c_structures import compiler_errors
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.engines.batch.kernels import FILES, sources_of
 from orchestration.simulation.engines.wasm.tables_of_system import SystemTables
 from orchestration.systems.schedule.compiled_timetable import FILES as TIMETABLE
@@ -84,10 +84,8 @@ def module_of(tables: SystemTables, lanes: int) -> bytes:
     """The WebAssembly module of a system for a number of SIMD lanes; raises `QuadcosimError` without its compiler."""
     units, options = units_of(tables, lanes), ("-msimd128",) if lanes > 1 else ()
     what = ("wasm", lanes, options, tuple(u.options for u in units))
-    try:
-        library = libraries.cached_library("wasm", sources_in(units), what, lambda: linked_for_wasm(units, options))
-    except (PackagingError, OSError) as error:
-        raise QuadcosimError(str(error)) from error
+    with compiler_errors():
+        library = cached_library("wasm", sources_in(units), what, lambda: linked_for_wasm(units, options))
     return library.read_bytes()
 
 
