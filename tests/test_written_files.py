@@ -25,7 +25,7 @@ _RUNS = "orchestration/simulation/runs"
 _OF_A_TOOL = "a process of another tool writes into the temporary folder of the comparison"
 EXCEPTIONS = {
     ("orchestration/components/building/builder.py", "TemporaryFile"): "has no name, so nothing can be left",
-    ("orchestration/experiments/studies/exporting.py", "to_csv"): "a method of `Result`, not of pandas",
+    ("orchestration/experiments/studies/table.py", "to_csv"): "a method of `Result`, not of pandas",
     ("orchestration/foundation/basics/terminal.py", "FileHandler"): "a log is appended to",
     ("orchestration/foundation/basics/terminal.py", "open"): "a stream",
     ("orchestration/foundation/processes/channel.py", "os.fdopen"): "pipes",

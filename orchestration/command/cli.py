@@ -12,8 +12,7 @@ import typer.core
 
 from orchestration.command import registry
 from orchestration.command.options import option
-from orchestration.command.plain_values import TakesPlainValues
-from orchestration.command.registry import OutputOptions, ask, option_group
+from orchestration.command.registry import OutputOptions, TakesPlainValues, ask, option_group
 from orchestration.components.building import consent
 from orchestration.foundation.basics.errors import (
     QuadcosimError,
@@ -91,7 +90,7 @@ COMMANDS = {
         *("controllers.compare", "controllers.tune", "exact.expect"),
         *("margin.margin", "margin.linearise", "loops.bode", "loops.step", "loops.locus"),
     ),
-    "FMUs": ("fmus.build", "wrap.wrap", "fmus.validate", "fmus.doctor"),
+    "FMUs": ("fmus.build", "new.wrap", "fmus.validate", "fmus.doctor"),
     "Other tools": ("other_tools.export_c", "other_tools.ssp", "other_tools.interop"),
 }
 """Modules of this package with the functions of commands, by groups, in the order of the help"""

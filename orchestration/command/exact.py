@@ -42,7 +42,7 @@ def warn_if_means_are_infinite(
     """Warn if averages over runs of these systems have no finite expectation."""
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
-    from orchestration.theory.exact.infinite_means import infinite_means_warning
+    from orchestration.theory.exact.mean_square import infinite_means_warning
 
     systems = [system_of(request)] if systems is None else systems
     text = infinite_means_warning(request, systems, files_of(systems[0]) if files is None else files)

@@ -44,9 +44,8 @@ def plot(
     """Draw the figures of a run again, or of several runs overlaid, for a screen, a paper or slides."""
     with progress_bar("drawing") as progress:  # first, as importing matplotlib takes time
         from orchestration.simulation.figures.style import save
-        from orchestration.simulation.runs.draw import draw
+        from orchestration.simulation.runs.draw import draw, labels_of_runs
         from orchestration.simulation.runs.run_directory import load_run
-        from orchestration.simulation.runs.run_labels import labels_of_runs
 
         results = [load_run(one) for one in directory]
         names = labels_of_runs(results, [str(one) for one in directory])

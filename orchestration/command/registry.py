@@ -3,8 +3,11 @@
 import inspect
 import json
 import logging
+import os
+import re
 import shlex
 import sys
+import typing
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial, wraps
@@ -12,9 +15,9 @@ from pathlib import Path, PurePath
 from typing import Annotated, Any
 
 import typer
+import typer.core
 
 from orchestration.command.options import option
-from orchestration.command.plain_values import PlainCommand
 from orchestration.foundation.basics import terminal
 from orchestration.foundation.basics.documents import plain
 from orchestration.foundation.basics.errors import UsageError
@@ -187,3 +190,49 @@ def expect_positive(flag: str, value: float | None, unit: str) -> None:
     """Raise `UsageError` for a limit that is not positive."""
     if value is not None and not value > 0.0:
         raise UsageError(f"{flag} {value:g}: expected a positive number of {unit}")
+
+
+_WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
+_DECIMAL = re.compile(r"[+-]?([0-9]{1,18}\.?|[0-9]{0,18}\.[0-9]{1,18})([eE][+-]?[0-9]{1,3})?")
+_LEFT = object()
+
+
+class TakesPlainValues:
+    """A command of the parser, or a group of commands, that takes such values of its parameters as they are."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, as the parser asks for them."""
+        parameters: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for parameter in parameters:
+            if hasattr(parameter, "type_descriptor") and "process_value" not in vars(parameter):
+                parameter.process_value = partial(_processed, parameter, parameter.process_value)
+        return parameters
+
+
+class PlainCommand(TakesPlainValues, typer.core.TyperCommand):
+    """Such a command."""
+
+
+def _processed(parameter: Any, by_parser: Callable[..., Any], context: Any, value: Any) -> Any:
+    plain = _plain(value, parameter)
+    if plain is _LEFT:
+        return by_parser(context, value)
+    return plain if parameter.callback is None else parameter.callback(context, parameter, plain)
+
+
+def _plain(value: Any, parameter: Any) -> Any:
+    """The value, if it is plain."""
+    several, kind = parameter.multiple or parameter.nargs != 1, parameter.type_descriptor.annotation
+    if value is None and not parameter.required:
+        return () if several else None
+    kind = next((one for one in (str, float, int, Path) if kind in (one, typing.Optional[one])), None)  # noqa: UP045
+    if several or kind is None or parameter.type_descriptor.is_ranged:
+        return _LEFT
+    if type(value) is kind:
+        return value
+    if type(value) is not str:
+        return _LEFT
+    if kind is Path:
+        return Path(value) if os.access(value, os.R_OK) or not os.path.lexists(value) else _LEFT
+    pattern = _DECIMAL if kind is float else _WHOLE
+    return kind(value) if pattern.fullmatch(value) else _LEFT

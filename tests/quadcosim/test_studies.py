@@ -156,7 +156,7 @@ def test_a_sweep_draws_what_its_criterion_is_about_or_what_is_asked_for(swept: S
 def test_the_rows_of_a_study_say_the_unit_of_an_axis_in_parquet_and_mat(swept: Swept) -> None:
     from scipy.io import loadmat
 
-    from orchestration.experiments.studies.exporting import of_study
+    from orchestration.experiments.studies.table import of_study
 
     parquet, mat = of_study(swept.path, ("parquet", "mat"))
     assert pq.read_schema(parquet).field("timing.period").metadata[b"unit"] == b"s"

@@ -8,9 +8,23 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from fmu_kit import write_description
-from fmu_kit.compiler.emit.sampling_clock import CLOCK, samples
 from fmu_kit.variables import Variable
 from fmu_kit.write_description import GUID_PLACEHOLDER, NATIVE_LOG_CATEGORIES
+
+CLOCK = "sample_clock"
+"""Name of the clock"""
+_PERIOD = "sample_period"
+
+
+def sampling_period(slave: Any) -> int | None:
+    """The value reference of the parameter that is the period of its samples, 0 for one at every step; None: none."""
+    return next((i for i, v in enumerate(slave.variables) if v.name == _PERIOD and v.is_settable), None)
+
+
+def samples(slave: Any) -> bool:
+    """Whether it has one."""
+    return sampling_period(slave) is not None
+
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 """Types of variables, by their names in FMI 2.0"""

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from fmu_kit.compiler.emit.c_code import ERRORS
 from fmu_kit.compiler.emit.c_names import c_string, place_names
 from fmu_kit.compiler.emit.exchange import continuous_states
-from fmu_kit.compiler.emit.sampling_clock import sampling_period
-from fmu_kit.compiler.emit.standards import Standard
+from fmu_kit.compiler.emit.standards import Standard, sampling_period
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import Memory, attribute_name
 from fmu_kit.compiler.trace.statements import Place

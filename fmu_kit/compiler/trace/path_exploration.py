@@ -18,17 +18,19 @@ from typing import Any
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import Memory
 from fmu_kit.compiler.trace.merging import Merge, PathEnd, storable_value
-from fmu_kit.compiler.trace.messages import error_class, raise_statement, warn_statement
 from fmu_kit.compiler.trace.statements import (
     Block,
     Call,
     Function,
     Statement,
     branch,
+    error_class,
     has_effect,
+    raise_statement,
     raises_of,
     statement,
     stores_of,
+    warn_statement,
 )
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, common_kind, decided, hooks, lifted, node, truth
 from fmu_kit.compiler.trace.texts import marker

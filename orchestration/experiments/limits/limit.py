@@ -11,8 +11,7 @@ from orchestration.foundation.basics.bisection import Bracket, Range, bisected, 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.number_text import quantity
-from orchestration.foundation.basics.progress import ShareProgress, share_reporter
-from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range

@@ -24,8 +24,7 @@ from orchestration.simulation.engines.resolved import (
 from orchestration.simulation.runs.columns import first_differences
 from orchestration.systems.signals.waypoints import read_waypoints
 from orchestration.systems.system.check import check_parameter, connect_references
-from orchestration.systems.system.files import Files
-from orchestration.systems.system.input_files import distributions_in
+from orchestration.systems.system.files import Files, distributions_in
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms
 

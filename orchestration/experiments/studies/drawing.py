@@ -12,7 +12,7 @@ from orchestration.experiments.studies import figures, sensitivity
 from orchestration.experiments.studies.axes import Axis, unit_points
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
-from orchestration.experiments.studies.maps import heat_map
+from orchestration.experiments.studies.figures import heat_map
 from orchestration.experiments.studies.shares import GOOD, with_chance
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with

@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_kit.scratch import temporary_folder
 from orchestration.experiments.studies import store_columns as columns
-from orchestration.experiments.studies import store_integrity as integrity
+from orchestration.experiments.studies import store_columns as integrity
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, shown
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.workers.row import TEXT, Rows

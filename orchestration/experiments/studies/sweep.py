@@ -25,9 +25,8 @@ from orchestration.experiments.studies.swept import Swept
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
-from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.terminal import Count, inform
+from orchestration.foundation.basics.terminal import Count, CountProgress, inform, runs_reporter
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at

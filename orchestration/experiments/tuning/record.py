@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from orchestration.experiments.studies import store_integrity as integrity
+from orchestration.experiments.studies import store_columns as integrity
 from orchestration.experiments.studies.store import locked_database
 from orchestration.experiments.tuning.tuning_problem import Costs, SearchResult
 from orchestration.foundation.basics.errors import QuadcosimError

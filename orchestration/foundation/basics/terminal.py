@@ -9,9 +9,9 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Literal, TextIO, TypeAlias, TypeVar
 
 Share = Callable[[float], None]
 """Called with the share of the work done."""
@@ -266,3 +266,28 @@ def _set_output(target: int) -> None:
         library = ctypes.cdll.msvcrt if sys.platform == "win32" else ctypes.CDLL(None)
         library.fflush(None)
     os.dup2(target, _OUT)
+
+
+Reporter = TypeVar("Reporter")
+ShareProgress: TypeAlias = Share | Literal["bar"] | None
+"""`bar`: a bar on a terminal, occasional lines elsewhere and in notebooks; a function: called with the share done"""
+CountProgress: TypeAlias = Count | Literal["bar"] | None
+"""Likewise, but a function is called with the number of runs done and the total"""
+
+
+def share_reporter(progress: ShareProgress, what: str) -> AbstractContextManager[Share]:
+    """The function to call with the share of the work done."""
+    return _reporter(progress, lambda: progress_bar(what), lambda share: None)
+
+
+def runs_reporter(progress: CountProgress) -> AbstractContextManager[Count]:
+    """The function to call with the number of runs done and the total."""
+    return _reporter(progress, runs_bar, lambda done, total: None)
+
+
+def _reporter(
+    progress: Reporter | Literal["bar"] | None, bar: Callable[[], AbstractContextManager[Reporter]], silent: Reporter
+) -> AbstractContextManager[Reporter]:
+    if isinstance(progress, str):
+        return bar()
+    return nullcontext(silent if progress is None else progress)

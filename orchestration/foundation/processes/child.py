@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import IO, Any, TypeVar
 
 from orchestration.foundation.processes.channel import LongError, read_frame, to_frame, write_frame
-from orchestration.foundation.processes.family import Family
+from orchestration.foundation.processes.family import Family, Process
 from orchestration.foundation.processes.fork_server import forked
 from orchestration.foundation.processes.limit_enforcement import Watch
-from orchestration.foundation.processes.process import Process
 from orchestration.foundation.processes.resource_limits import UNLIMITED, Limits
 from orchestration.foundation.processes.subprocesses import Module
 from orchestration.foundation.processes.subprocesses import environment as usual_environment

@@ -6,13 +6,51 @@ import os
 import signal
 import subprocess
 import sys
+import time
 import uuid
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Protocol
 
-from orchestration.foundation.processes.process import Process
-from orchestration.foundation.processes.waiting import waits
+_NANOSECONDS = 1e9
+
+
+def waits(process: int) -> dict[int, float]:
+    """Seconds for which each living thread of a process was runnable but not running.
+
+    Empty for a process that has ended, and on systems other than Linux.
+    """
+    seconds = {}
+    with contextlib.suppress(OSError):
+        for thread in Path(f"/proc/{process}/task").iterdir():
+            with contextlib.suppress(OSError, ValueError, IndexError):  # it may end meanwhile
+                seconds[int(thread.name)] = int((thread / "schedstat").read_text().split()[1]) / _NANOSECONDS
+    return seconds
+
+
+def own_clock() -> float:
+    """Seconds on a clock of this process that stops while it waits for a processor."""
+    return time.monotonic() - max(waits(os.getpid()).values(), default=0.0)
+
+
+class Process(Protocol):
+    """A `subprocess.Popen`, as far as it is used here."""
+
+    pid: int
+    stdin: IO[bytes] | None
+    stdout: IO[bytes] | None
+    stderr: IO[bytes] | None
+
+    def poll(self) -> int | None:
+        """Its exit code; None while it runs."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit code, when it has ended; raises `subprocess.TimeoutExpired` after `timeout` [s]."""
+
+    def send_signal(self, sig: int) -> None:
+        """Send it a signal, unless it has ended."""
+
 
 _MARK = "QUADCOSIM_FAMILY"
 """Lists the names of the families that a process belongs to, outermost first"""

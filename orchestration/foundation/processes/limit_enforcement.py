@@ -7,8 +7,7 @@ import time
 from collections.abc import Mapping
 from typing import Protocol
 
-from orchestration.foundation.processes.family import Family, Member
-from orchestration.foundation.processes.process import Process
+from orchestration.foundation.processes.family import Family, Member, Process
 from orchestration.foundation.processes.resource_limits import Limits
 
 

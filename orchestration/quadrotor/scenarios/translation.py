@@ -10,7 +10,7 @@ from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.quadrotor.scenarios.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
-from orchestration.systems.signals.limits import AXES
+from orchestration.systems.signals.library import AXES
 from orchestration.systems.signals.table_file import header_of
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System

@@ -6,7 +6,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.times import seconds
-from orchestration.systems.computers.results import Frames, Jobs, Timeline
+from orchestration.systems.computers.timeline import Frames, Jobs, Timeline
 from orchestration.systems.expressions import syntax
 from orchestration.systems.expressions.over_run import Recorded, evaluate, job_terms
 from orchestration.systems.schedule.resources import timeline_of

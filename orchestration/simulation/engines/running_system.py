@@ -4,6 +4,7 @@ It is shared by the master (`master.py`) and the loops (`instants.py`, `compiled
 """
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,13 +13,12 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import SimulatorError, StoppedStepError
 from orchestration.foundation.basics.simulator import Floats, Simulator, Transfer
+from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.algebraic_loops import closing_of
 from orchestration.simulation.engines.condition import NEVER, Condition
 from orchestration.simulation.engines.connection_hold import Channel
-from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.initial import Dependencies
-from orchestration.simulation.engines.pace import Pace
-from orchestration.simulation.engines.sources import SourceValues
+from orchestration.simulation.engines.sources import Feed, SourceValues
 from orchestration.simulation.engines.wiring_by_index import Wires
 from orchestration.systems.schedule.instant_arrays import Cursor, Schedule
 from orchestration.systems.schedule.streams import NOISE, Streams
@@ -200,3 +200,31 @@ class RunningSystem:
             "feeds": [feed for feed in self.feeds if feed.feeds(name)],
             "held": [self.channels[i] for i in self.wires.into(name).held],
         }
+
+
+LONGEST_SLEEP = 0.1
+"""The longest time between two looks for an interruption [s]"""
+
+
+class Pace:
+    """Waits for instants; times of the run pass `rate` times as fast as those of the clock, from its start."""
+
+    def __init__(
+        self,
+        rate: float,
+        now: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._rate, self._now, self._sleep = rate, now, sleep
+        self._begin: float | None = None
+        self.largest_lateness = 0.0
+        """The longest time by which an instant began too late [s]"""
+
+    def wait(self, instant: int, interrupted: Callable[[], bool]) -> None:
+        """Return at the time of an instant [ns], or at once if that is over, or after an interruption."""
+        due = seconds(instant) / self._rate
+        if self._begin is None:
+            self._begin = self._now() - due
+        while (left := self._begin + due - self._now()) > 0.0 and not interrupted():
+            self._sleep(min(left, LONGEST_SLEEP))
+        self.largest_lateness = max(self.largest_lateness, -left)

@@ -15,7 +15,7 @@ from orchestration.foundation.basics.times import NANOSECONDS, seconds
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.palette import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED, SKY
 from orchestration.simulation.figures.style import Style
-from orchestration.systems.computers import results
+from orchestration.systems.computers import timeline
 from orchestration.systems.schedule.resources import timeline_of
 
 PIECES = 60
@@ -33,9 +33,9 @@ class _Row:
 
     name: str
     color: str
-    slices: results.Slices
+    slices: timeline.Slices
     owner: int
-    of: results.Jobs | results.Frames
+    of: timeline.Jobs | timeline.Frames
 
 
 def chart(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
@@ -46,7 +46,7 @@ def chart(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
     return draw(timeline_of(system), style, runs[0].window)
 
 
-def draw(timeline: results.Timeline, style: Style, window: Window | None = None) -> Figure:
+def draw(timeline: timeline.Timeline, style: Style, window: Window | None = None) -> Figure:
     """A panel for each processor and link with a row for each task and message; `window` [s]: default of the timeline.
 
     A bar is execution, a thin one waiting since the release; switches are grey. An arrow is a release, a short stroke
@@ -71,14 +71,14 @@ def draw(timeline: results.Timeline, style: Style, window: Window | None = None)
     return figure
 
 
-def default_window(timeline: results.Timeline) -> Window:
+def default_window(timeline: timeline.Timeline) -> Window:
     """From 0 to the time at which the busiest processor or link has had `PIECES` pieces, or to the end [s]."""
     shared = (*timeline.processors.values(), *timeline.links.values())
     ends = [int(each.begin[PIECES]) for each in shared if len(each.begin) > PIECES]
     return 0.0, seconds(min([timeline.stop, *ends]))
 
 
-def _panels(timeline: results.Timeline) -> dict[str, list[_Row]]:
+def _panels(timeline: timeline.Timeline) -> dict[str, list[_Row]]:
     colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate((*timeline.jobs, *timeline.frames))}
     panels: dict[str, list[_Row]] = {}
     for what, shared in ((timeline.jobs, timeline.processors), (timeline.frames, timeline.links)):
@@ -96,7 +96,7 @@ def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, sty
     of, slices = row.of, row.slices
     first, last = shown[0] * NANOSECONDS, shown[1] * NANOSECONDS
     waits = _released(of)
-    ends = np.where(of.ended == results.NEVER, last, of.ended)
+    ends = np.where(of.ended == timeline.NEVER, last, of.ended)
     here = (waits <= last) & (ends >= first) & ~_are_skipped(of)
     bars = _spans(waits[here], ends[here], scale)
     axes.broken_barh(bars, (place - LATE / 2, LATE), facecolors=row.color, alpha=0.35, linewidth=0)
@@ -113,12 +113,12 @@ def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, sty
         axes.vlines(due[which] * scale, place - BAR / 2, place + BAR / 2 + 0.08, colors=color, linewidth=style.line)
 
 
-def _released(of: results.Jobs | results.Frames) -> Integers:
-    return of.released if isinstance(of, results.Jobs) else of.queued
+def _released(of: timeline.Jobs | timeline.Frames) -> Integers:
+    return of.released if isinstance(of, timeline.Jobs) else of.queued
 
 
-def _are_skipped(of: results.Jobs | results.Frames) -> Booleans:
-    return of.outcome == results.SKIPPED if isinstance(of, results.Jobs) else np.zeros(len(of), dtype=np.bool_)
+def _are_skipped(of: timeline.Jobs | timeline.Frames) -> Booleans:
+    return of.outcome == timeline.SKIPPED if isinstance(of, timeline.Jobs) else np.zeros(len(of), dtype=np.bool_)
 
 
 def _spans(begins: Integers, ends: Integers, scale: float) -> list[tuple[float, float]]:
@@ -128,9 +128,9 @@ def _spans(begins: Integers, ends: Integers, scale: float) -> list[tuple[float, 
 
 def _kinds(color: str) -> Mapping[int, dict[str, Any]]:
     return {
-        results.RUN: {"facecolors": color, "linewidth": 0},
-        results.SWITCH: {"facecolors": GREY, "linewidth": 0},
-        results.CORRUPTED: {"facecolors": "white", "edgecolors": RED, "hatch": "////", "linewidth": 0.5},
+        timeline.RUN: {"facecolors": color, "linewidth": 0},
+        timeline.SWITCH: {"facecolors": GREY, "linewidth": 0},
+        timeline.CORRUPTED: {"facecolors": "white", "edgecolors": RED, "hatch": "////", "linewidth": 0.5},
     }
 
 
@@ -150,7 +150,7 @@ def _optional_entries(panels: Mapping[str, list[_Row]]) -> Iterator[Line2D | Pat
     if any(row.of.missed.any() for row in rows):
         yield Line2D([], [], color=RED, marker="|", linestyle="", label="missed")
     kinds = {int(kind) for row in rows for kind in np.unique(row.slices.kind)}
-    if results.SWITCH in kinds:
+    if timeline.SWITCH in kinds:
         yield Patch(facecolor=GREY, label="switch")
-    if results.CORRUPTED in kinds:
+    if timeline.CORRUPTED in kinds:
         yield Patch(facecolor="white", edgecolor=RED, hatch="////", label="sent again")

@@ -23,7 +23,7 @@ from orchestration.simulation.runs.prepared import PreparedRun
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_directory import METRICS, SCENARIO, STATE, keep_run
 from orchestration.simulation.runs.simulation import simulate
-from orchestration.systems.system.input_files import input_files
+from orchestration.systems.system.files import input_files
 from orchestration.systems.system.request import system_of
 
 

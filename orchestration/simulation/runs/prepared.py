@@ -23,12 +23,11 @@ from orchestration.foundation.basics.times import seconds
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.condition import Condition
-from orchestration.simulation.engines.feeds import Feed
 from orchestration.simulation.engines.master import Engine, Master, create_master
 from orchestration.simulation.engines.memory import Allocator, process_memory
 from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, resolve
 from orchestration.simulation.engines.running_system import RunningSystem
-from orchestration.simulation.engines.sources import SourceValues, TableValues
+from orchestration.simulation.engines.sources import Feed, SourceValues, TableValues
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.schedule.compiled_timetable import timetable

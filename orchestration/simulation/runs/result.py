@@ -232,9 +232,9 @@ class Result:
 
     def to_csv(self, folder: str | Path) -> list[Path]:
         """Write `signals.csv` and `events.csv` into a folder, with units in the column heads; returns their paths."""
-        from orchestration.foundation.recording import csv_files  # not before: loads pyarrow
+        from orchestration.foundation.recording import frames  # not before: loads pyarrow
 
-        return csv_files.write(self.recording, self.about, Path(folder))
+        return frames.write_csv(self.recording, self.about, Path(folder))
 
     @explains_missing
     def to_mat(self, path: str | Path) -> Path:

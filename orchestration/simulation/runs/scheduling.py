@@ -20,7 +20,7 @@ from orchestration.simulation.requests.request import (
     request_of,
 )
 from orchestration.simulation.runs.arguments import window_within
-from orchestration.systems.computers.results import Timeline
+from orchestration.systems.computers.timeline import Timeline
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.schedule.responses import Responses, responses_of
 from orchestration.systems.system.request import Request, system_of

@@ -8,8 +8,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
 from orchestration.simulation.engines.master import Engine, engine_named
-from orchestration.simulation.engines.pace import Pace
 from orchestration.simulation.engines.resolved import Announce, resolve
+from orchestration.simulation.engines.running_system import Pace
 from orchestration.simulation.runs.outcome import Course, Progress
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
 from orchestration.simulation.runs.result import Result

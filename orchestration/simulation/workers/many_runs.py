@@ -12,9 +12,8 @@ import numpy as np
 
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
-from orchestration.foundation.basics.progress import CountProgress, runs_reporter
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.terminal import warn
+from orchestration.foundation.basics.terminal import CountProgress, runs_reporter, warn
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.engines.batch.shape import expect_lanes

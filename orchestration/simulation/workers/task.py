@@ -24,8 +24,7 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.workers.row import Outcome, Results, Rows
 from orchestration.systems.system.connection import component_of
-from orchestration.systems.system.files import all_with_files, with_files
-from orchestration.systems.system.input_files import input_files
+from orchestration.systems.system.files import all_with_files, input_files, with_files
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import with_values
 

@@ -1,6 +1,6 @@
-"""The timeline of tasks and messages from the notes of the scheduler."""
+"""The timeline of tasks and messages: their jobs and frames, and the use of processors and networks."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -8,10 +8,121 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Booleans, Integers
 from orchestration.foundation.recording.recording import Events
-from orchestration.systems.computers import note, results
+from orchestration.systems.computers import note
 from orchestration.systems.computers.parts import LATER, NONE, Parts
-from orchestration.systems.computers.results import Frames, Jobs, Slices, Timeline
 from orchestration.systems.computers.scheduler_events import EventBuilder
+
+NEVER = -1
+"""The time of what did not happen"""
+DONE, UNFINISHED, SKIPPED, ABORTED = range(4)
+"""Outcomes of a job: one that is under way or waits at the end is unfinished"""
+RUN, SWITCH, CORRUPTED = range(3)
+"""Uses of a processor or a network: work, the switch before it, or a corrupted frame"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Records:
+    """Jobs or frames, in the order of their release."""
+
+    nominal: Integers
+    """the nominal releases, from which responses and deadlines count"""
+    started: Integers
+    """Times at which its first instruction ran, or its first bit was first sent"""
+    ended: Integers
+    """Times at which it was done, or received"""
+    deadline: Integers
+    """the largest number for none"""
+    stop: int
+
+    def __len__(self) -> int:
+        return len(self.nominal)
+
+    @property
+    def done(self) -> Booleans:
+        """Which of them are done, or received."""
+        found: Booleans = self.ended != NEVER
+        return found
+
+    @property
+    def responses(self) -> Integers:
+        """The times from nominal release to end, of those that are done."""
+        found: Integers = (self.ended - self.nominal)[self.done]
+        return found
+
+    @property
+    def due(self) -> Booleans:
+        """Which of them have their deadline within the run."""
+        found: Booleans = self.deadline <= self.stop
+        return found
+
+    @property
+    def missed(self) -> Booleans:
+        """Which of those that are `due` were not done by their deadline, including skipped and aborted ones."""
+        found: Booleans = self.due & ((self.ended == NEVER) | (self.ended > self.deadline))
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jobs(_Records):
+    """The jobs of one task, by index in the order of release, including skipped ones."""
+
+    released: Integers
+    """the releases"""
+    written: Integers
+    """Times at which outputs were sent"""
+    preemptions: Integers
+    """the number of preemptions of each"""
+    outcome: Integers
+    """DONE, UNFINISHED, SKIPPED or ABORTED"""
+
+    @property
+    def done(self) -> Booleans:
+        """Which of them are done, without aborted ones."""
+        found: Booleans = self.outcome == DONE
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frames(_Records):
+    """The messages of one name, in the order in which they were queued."""
+
+    queued: Integers
+    attempts: Integers
+    """the number of transmissions; over two links at least two"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slices:
+    """The use of one processor, or of one link of a network, as consecutive slices."""
+
+    owners: tuple[str, ...]
+    """the names of its tasks, or of the messages over it"""
+    owner: Integers
+    """the index of the owner of each slice"""
+    number: Integers
+    """the index of its job or frame"""
+    begin: Integers
+    end: Integers
+    kind: Integers
+    """RUN, SWITCH or CORRUPTED"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timeline:
+    """The timeline of all computers and networks of a system, up to a time."""
+
+    stop: int
+    jobs: Mapping[str, Jobs]
+    """Jobs by COMPUTER.TASK"""
+    frames: Mapping[str, Frames]
+    """Frames by NETWORK.MESSAGE"""
+    processors: Mapping[str, Slices]
+    """Slices by computer"""
+    links: Mapping[str, Slices]
+    """Slices by network or, where it has several links, by `NETWORK: NODE -> switch`"""
+    happenings: Callable[[], Events]
+    """the events, in order"""
+
 
 _OF_TASKS = tuple(kind for kind in range(note.QUEUED) if kind != note.SAMPLED)
 _OF_MESSAGES = (note.QUEUED, note.FRAME_STARTED, note.FRAME_CORRUPTED, note.FRAME_TRANSMITTED)
@@ -79,15 +190,15 @@ def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
     count = len(first)
 
     def times(kind: int) -> Integers:
-        found = np.full(count, results.NEVER, dtype=np.int64)
+        found = np.full(count, NEVER, dtype=np.int64)
         some = notes[what == kind]
         found[some[:, 3]] = some[:, 0]
         return found
 
     ended = times(note.FINISHED)
-    outcome = np.where(ended == results.NEVER, results.UNFINISHED, results.DONE)
-    outcome[notes[what == note.ABORTED, 3]] = results.ABORTED
-    outcome[notes[what == note.SKIPPED, 3]] = results.SKIPPED
+    outcome = np.where(ended == NEVER, UNFINISHED, DONE)
+    outcome[notes[what == note.ABORTED, 3]] = ABORTED
+    outcome[notes[what == note.SKIPPED, 3]] = SKIPPED
     return Jobs(
         nominal=first[:, 4],
         released=first[:, 0],
@@ -104,7 +215,7 @@ def _jobs(notes: Integers, deadline: int, stop: int) -> Jobs:
 def _frames(notes: Integers, deadline: int, legs: int, stop: int) -> Frames:
     what = notes[:, 1]
     first = notes[what == note.QUEUED]
-    started, ended = np.full((2, len(first)), results.NEVER, dtype=np.int64)
+    started, ended = np.full((2, len(first)), NEVER, dtype=np.int64)
     first_bits = notes[(what == note.FRAME_STARTED) & (notes[:, 4] == 0)]
     last = notes[(what == note.FRAME_TRANSMITTED) & (notes[:, 4] == legs - 1)]
     started[first_bits[::-1, 3]] = first_bits[::-1, 0]  # of several attempts the first
@@ -124,7 +235,7 @@ def _slices_of_processor(notes: Integers, parts: Parts, processor: int, names: S
     """The slices of a processor: each note about its use ends the slice before it."""
     owners = [i for i, task in enumerate(parts.tasks) if task.processor == processor]
     kept = notes[_are(notes[:, 1], _ON_A_PROCESSOR) & np.isin(notes[:, 2], owners)]
-    kinds = np.where(kept[:, 1] == note.SWITCHING, results.SWITCH, results.RUN)
+    kinds = np.where(kept[:, 1] == note.SWITCHING, SWITCH, RUN)
     return _slices(kept, kinds, (note.SWITCHING, note.STARTED, note.RESUMED), owners, names, stop)
 
 
@@ -138,9 +249,7 @@ def _slices_of_link(notes: Integers, parts: Parts, link: int, names: Sequence[st
     kept = notes[where[notes[:, 2], notes[:, 4]] == link]
     is_corrupted = np.append(kept[1:, 1] == note.FRAME_CORRUPTED, [False])[: len(kept)]
     owners = np.flatnonzero((where == link).any(axis=1)).tolist()
-    return _slices(
-        kept, np.where(is_corrupted, results.CORRUPTED, results.RUN), (note.FRAME_STARTED,), owners, names, stop
-    )
+    return _slices(kept, np.where(is_corrupted, CORRUPTED, RUN), (note.FRAME_STARTED,), owners, names, stop)
 
 
 def _slices(

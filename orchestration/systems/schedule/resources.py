@@ -33,9 +33,8 @@ from orchestration.systems.computers.parts import (
     ScheduledTask,
     Stream,
 )
-from orchestration.systems.computers.results import Timeline
 from orchestration.systems.computers.scheduler_events import EventBuilder
-from orchestration.systems.computers.timeline import NEEDED, Names, timeline
+from orchestration.systems.computers.timeline import NEEDED, Names, Timeline, timeline
 from orchestration.systems.schedule.lateness_and_loss import lateness, losses, times
 from orchestration.systems.schedule.plan import expect_no_longer
 from orchestration.systems.schedule.streams import (

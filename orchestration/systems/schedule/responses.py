@@ -11,7 +11,7 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.bounds import bounds_of
-from orchestration.systems.computers.results import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
+from orchestration.systems.computers.timeline import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
 from orchestration.systems.system.computers import Message, Task
 from orchestration.systems.system.distribution import mean
 from orchestration.systems.system.frames import frame_nanoseconds

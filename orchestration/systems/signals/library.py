@@ -1,14 +1,34 @@
-"""Signals by name, with their parameters."""
+"""Signals by name with their parameters, and the limits of a curve through way-points."""
 
 import dataclasses
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from orchestration.foundation.basics.errors import UsageError, expected_name, prefixed, shown
 from orchestration.systems.signals.dryden import Dryden
-from orchestration.systems.signals.limits import SignalLimits
 from orchestration.systems.signals.motions import MOTIONS
+
+AXES = ("x", "y", "z")
+"""Columns of way-points [m], inertial"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalLimits:
+    """The limits of a curve through way-points without times."""
+
+    speed: float = 1.0
+    """Speed for points without one in the file [m/s]"""
+    acceleration: float = 1.0
+    """Largest acceleration [m/s²]"""
+
+    def __post_init__(self) -> None:
+        for name in ("speed", "acceleration"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise UsageError(f"{name} = {value}: expected a positive number")
+
 
 KINDS: dict[str, dict[str, type]] = {"motion": {**MOTIONS}, "wind": {"dryden": Dryden}}
 SIGNALS = {name: kind for kinds in KINDS.values() for name, kind in kinds.items()}

@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.systems.signals.limits import AXES, SignalLimits
+from orchestration.systems.signals.library import AXES, SignalLimits
 from orchestration.systems.signals.spline import DEGREE, Spline, through
 from orchestration.systems.signals.table_file import TIME, TableRows, read_rows
 

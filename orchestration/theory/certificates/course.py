@@ -16,7 +16,7 @@ from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.varying import Point
 from orchestration.theory.exact.branch import BranchEvent, Piece
 from orchestration.theory.exact.effects import ContinuousEffects, Places
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask
+from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.theory.exact.timing_chain import TimingChain
 from orchestration.theory.stability.matrices import Components
 

@@ -13,8 +13,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.number_text import quantity
-from orchestration.foundation.basics.progress import ShareProgress, share_reporter
-from orchestration.foundation.basics.terminal import Share
+from orchestration.foundation.basics.terminal import Share, ShareProgress, share_reporter
 from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseconds
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.requests.request import RequestLike, request_of

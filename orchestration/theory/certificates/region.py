@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from fmu_kit.new_files import new_files, write_atomically
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
-from orchestration.foundation.basics.progress import ShareProgress, share_reporter
+from orchestration.foundation.basics.terminal import ShareProgress, share_reporter
 from orchestration.foundation.basics.times import floor_to_nanoseconds
 from orchestration.simulation.figures.palette import BLUE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save

@@ -14,8 +14,14 @@ from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.course import Courses, PieceAt, Steps, time_at
 from orchestration.theory.certificates.family import Letter, LoopFamily
 from orchestration.theory.certificates.varying import DELAY, JITTER, LATENCY, LOSS, SHIFT, Draws, Point, Varying
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
-from orchestration.theory.exact.random_times import RandomTime
+from orchestration.theory.exact.random_times import (
+    ATTOSECONDS,
+    RandomLink,
+    RandomTime,
+    SampledTask,
+    attoseconds,
+    exact_seconds,
+)
 from orchestration.theory.exact.timing import links_of, sampled_tasks
 from orchestration.theory.stability.operating_point import hyperperiod
 

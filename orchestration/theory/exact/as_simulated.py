@@ -13,8 +13,8 @@ from orchestration.systems.system.model import System
 from orchestration.theory.exact.branch import Piece
 from orchestration.theory.exact.effects import LoopEffects, Places
 from orchestration.theory.exact.flows import Flows
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, exact_seconds
 from orchestration.theory.exact.objectives import Mean
+from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, exact_seconds
 from orchestration.theory.stability.matrices import Components, Continuous
 
 

@@ -26,8 +26,7 @@ from orchestration.theory.exact.branch import (
     place_in,
 )
 from orchestration.theory.exact.effects import LoopEffects
-from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
-from orchestration.theory.exact.random_times import Kinks
+from orchestration.theory.exact.random_times import Kinks, RandomLink, SampledTask, attoseconds
 
 NEGLIGIBLE = 1e-13
 """A probability: less likely runs of losses count as the longest distinguished one"""

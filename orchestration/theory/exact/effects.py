@@ -20,8 +20,8 @@ from orchestration.systems.system.model import System
 from orchestration.theory.exact.branch import BranchEvent, Piece
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.initial_state import InitialState
-from orchestration.theory.exact.links import ATTOSECONDS
 from orchestration.theory.exact.objectives import Mean
+from orchestration.theory.exact.random_times import ATTOSECONDS
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 
 

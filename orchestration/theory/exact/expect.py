@@ -15,7 +15,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.exact.loops import Converged, Loops
-from orchestration.theory.exact.objective_means import ObjectiveMeans
+from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.stability.known_loops import LOOPS, rested
 
 

@@ -26,9 +26,9 @@ from orchestration.theory.exact.as_simulated import SimulatedEffects, expect_row
 from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
 from orchestration.theory.exact.initial_state import InitialState, initial_state_of
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.moments import JumpLinear
-from orchestration.theory.exact.objective_means import ObjectiveMeans
+from orchestration.theory.exact.objectives import ObjectiveMeans
+from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.repeating import periodic_schedule
 from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.exact.timing import links_of, sampled_tasks

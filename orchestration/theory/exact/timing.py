@@ -9,9 +9,19 @@ from orchestration.systems.system.choices import Spread
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
-from orchestration.theory.exact.links import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
-from orchestration.theory.exact.periodic_schedule import NO_SCHEDULE, PeriodicSchedule
-from orchestration.theory.exact.random_times import CERTAIN, RandomTime, normal, table, uniform
+from orchestration.theory.exact.random_times import (
+    ATTOSECONDS,
+    CERTAIN,
+    RandomLink,
+    RandomTime,
+    SampledTask,
+    attoseconds,
+    exact_seconds,
+    normal,
+    table,
+    uniform,
+)
+from orchestration.theory.exact.repeating import NO_SCHEDULE, PeriodicSchedule
 
 
 def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[SampledTask]:

@@ -18,8 +18,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.exact.branch import Branch, Mode, Piece
 from orchestration.theory.exact.branching import Branching
 from orchestration.theory.exact.effects import LoopEffects
-from orchestration.theory.exact.links import RandomLink, SampledTask, attoseconds
 from orchestration.theory.exact.moments import Passage, Stage
+from orchestration.theory.exact.random_times import RandomLink, SampledTask, attoseconds
 from orchestration.theory.stability.operating_point import hyperperiod
 
 MOST_MODES = 2000

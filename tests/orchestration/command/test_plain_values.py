@@ -7,8 +7,8 @@ import pytest
 import typer
 import typer.main
 
-from orchestration.command import plain_values
-from orchestration.command.plain_values import PlainCommand
+from orchestration.command import registry
+from orchestration.command.registry import PlainCommand
 
 TEXTS = ["0", "1", "-1", "+2", "1.5", ".5", "5.", "1e3", "1E-300", "1e999", "nan", "inf", " 1", "1_0", "0x1", "", "a"]
 seen: list[Any] = []
@@ -41,6 +41,6 @@ def test_each_value_is_what_the_parser_makes_of_it(monkeypatch: pytest.MonkeyPat
     lines: list[list[str]] = [[], ["--flag"], ["--several", "a", "--several", "b"]]
     lines += [[f"--{name}={text}"] for name in ("text", "number", "whole", "ranged", "path") for text in TEXTS]
     found = [outcome(*line) for line in lines]
-    monkeypatch.setattr(plain_values, "_plain", lambda value, parameter: plain_values._LEFT)
+    monkeypatch.setattr(registry, "_plain", lambda value, parameter: registry._LEFT)
     for line, one in zip(lines, found, strict=True):
         assert one == outcome(*line), line

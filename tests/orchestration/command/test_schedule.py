@@ -12,7 +12,7 @@ from orchestration.simulation.figures import gantt
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.style import SCREEN
 from orchestration.simulation.requests.ranges import default_quantity
-from orchestration.systems.computers.results import Timeline
+from orchestration.systems.computers.timeline import Timeline
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from quadcosim import schedule

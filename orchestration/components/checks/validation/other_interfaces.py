@@ -18,7 +18,7 @@ from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.read_description import Model, declared_of, read_model
 from orchestration.foundation.basics.errors import QuadcosimError, StoppedStepError, UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.processes.waiting import own_clock
+from orchestration.foundation.processes.family import own_clock
 
 STEPS = 20
 """steps of a run, or ticks of the clock of every sample"""

@@ -22,7 +22,7 @@ from orchestration.components.checks.validation.run_comparison import deviations
 from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.components.fmi.slaves import Message
 from orchestration.foundation.basics.errors import SimulatorError
-from orchestration.foundation.processes.waiting import own_clock
+from orchestration.foundation.processes.family import own_clock
 
 MIN_STEPS = 3
 """steps of a run of an FMU, however slow it is"""

@@ -12,8 +12,7 @@ from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds, seconds
-from orchestration.simulation.engines.batch.arrays import BatchArrays, aligned
-from orchestration.simulation.engines.batch.batch_structures import BatchStructures
+from orchestration.simulation.engines.batch.arrays import BatchArrays, BatchStructures, aligned
 from orchestration.simulation.engines.batch.combining import combined
 from orchestration.simulation.engines.batch.initialisation import Initialisation
 from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, RunNumbers

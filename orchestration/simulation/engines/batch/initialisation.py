@@ -9,8 +9,7 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.foundation.basics.c_structures import address
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.simulation.engines import initial
-from orchestration.simulation.engines.batch.arrays import BatchArrays
-from orchestration.simulation.engines.batch.batch_structures import BatchStructures
+from orchestration.simulation.engines.batch.arrays import BatchArrays, BatchStructures
 from orchestration.simulation.engines.batch.run_numbers import RunNumbers, end_of
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.connection_hold import of_each

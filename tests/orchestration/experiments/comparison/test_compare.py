@@ -14,9 +14,8 @@ from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.comparison.run import agree
 from orchestration.experiments.report.of_comparison import comparison_report
 from orchestration.experiments.report.subset import Wanted
-from orchestration.quadrotor.flight.bandwidth import crossover
 from orchestration.quadrotor.flight.hover import COORDINATES, hover_of
-from orchestration.quadrotor.flight.hover_loop import controller_at_hover, located
+from orchestration.quadrotor.flight.hover_loop import controller_at_hover, crossover, located
 from quadcosim import FmuChoice, Scenario, UsageError
 from tests.commands import Main
 from tests.pictures import blank_pictures

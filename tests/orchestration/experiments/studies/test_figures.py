@@ -21,7 +21,7 @@ from orchestration.experiments.report.of_study import axes_of, read
 from orchestration.experiments.studies import figures
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.drawing import draw_study, study_figures
-from orchestration.experiments.studies.maps import heat_map
+from orchestration.experiments.studies.figures import heat_map
 from orchestration.experiments.studies.sensitivity import Index
 from orchestration.experiments.studies.store import open_for_writing, store_path
 from orchestration.experiments.studies.study import Study

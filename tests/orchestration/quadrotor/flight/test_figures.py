@@ -21,8 +21,7 @@ from orchestration.simulation.figures import signals
 from orchestration.simulation.figures.lines import clip_peaks
 from orchestration.simulation.figures.names import COLUMNS
 from orchestration.simulation.figures.style import SCREEN, STYLES, Style, save
-from orchestration.simulation.runs.draw import draw
-from orchestration.simulation.runs.run_labels import labels_of_runs
+from orchestration.simulation.runs.draw import draw, labels_of_runs
 from orchestration.systems.system.model import Criterion
 from quadcosim import Result, UsageError
 from tests.extent import in_test_all, sample

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from orchestration.simulation.engines.pace import LONGEST_SLEEP, Pace
+from orchestration.simulation.engines.running_system import LONGEST_SLEEP, Pace
 from orchestration.simulation.runs import simulation
 from orchestration.simulation.runs.simulation import simulate
 from quadcosim import Component, System

@@ -21,9 +21,8 @@ from orchestration.systems.computers.parts import (
     ScheduledTask,
     Stream,
 )
-from orchestration.systems.computers.results import Timeline
 from orchestration.systems.computers.scheduler import Scheduler
-from orchestration.systems.computers.timeline import Names, timeline
+from orchestration.systems.computers.timeline import Names, Timeline, timeline
 
 MS = 1_000_000
 

@@ -14,7 +14,7 @@ import pytest
 from orchestration.systems.computers.bounds import Periodic, can, earliest_deadline, fixed_priority
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import EARLIEST_DEADLINE, FIXED_PRIORITY
-from orchestration.systems.computers.results import Timeline
+from orchestration.systems.computers.timeline import Timeline
 from tests.extent import tries
 from tests.orchestration.systems.computers.described import Described
 

@@ -14,7 +14,7 @@ from orchestration.systems.computers.parts import (
     NONE,
     SKIP,
 )
-from orchestration.systems.computers.results import ABORTED, DONE, SKIPPED, SWITCH, UNFINISHED
+from orchestration.systems.computers.timeline import ABORTED, DONE, SKIPPED, SWITCH, UNFINISHED
 from tests.orchestration.systems.computers.described import MS, Described
 
 

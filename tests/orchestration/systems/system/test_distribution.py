@@ -16,7 +16,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.description import describe_faults, describe_varying
 from orchestration.systems.system.distribution import Distribution, content, highest, is_random, lowest, mean
 from orchestration.systems.system.file import load_system
-from orchestration.systems.system.input_files import input_files
+from orchestration.systems.system.files import input_files
 
 SYSTEM = """
 stop_time = 1.0
