@@ -18,10 +18,9 @@ from orchestration.components.building import fmus
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.workers.many_runs import fly
 from orchestration.systems.system.component import Component, Sampling
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
-from orchestration.systems.system.source import Source
 from orchestration.theory.exact.expect import Expected, expect
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

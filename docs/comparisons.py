@@ -36,7 +36,7 @@ from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import as_json
 from orchestration.experiments.comparison.run import compare
-from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.axes import quantity_of
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.statistics import first_end, wilson
 from orchestration.simulation.figures.palette import (

@@ -18,9 +18,9 @@ from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.systems.system.component import Parameter
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.source import Source
 from orchestration.theory.exact.expect import expected_of
 from orchestration.theory.exact.loops import Loops
 

@@ -83,12 +83,11 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.simulation.workers.many_runs import fly
     from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival
     from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
-    from orchestration.systems.system.connection import Connection
+    from orchestration.systems.system.connection import Connection, Source
     from orchestration.systems.system.distribution import Distribution
     from orchestration.systems.system.file import load_system
     from orchestration.systems.system.model import Criterion, System
     from orchestration.systems.system.paths import changed
-    from orchestration.systems.system.source import Source
     from orchestration.systems.system.vehicle import Vehicle
     from orchestration.theory.certificates.basin import Basin, basin
     from orchestration.theory.certificates.certificate import Checked

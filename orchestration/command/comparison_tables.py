@@ -8,7 +8,7 @@ from orchestration.experiments.comparison.cells import PEAK, VARIATION, CellSumm
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
-from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.axes import quantity_of
 from orchestration.foundation.basics.terminal import in_columns
 from orchestration.systems.system.requirements import is_number
 

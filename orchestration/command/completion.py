@@ -36,7 +36,7 @@ def vehicles(incomplete: str) -> list[str]:
 
 def presets(incomplete: str) -> list[str]:
     """The names of presets of timings."""
-    from orchestration.quadrotor.scenarios.presets import PRESETS
+    from orchestration.quadrotor.scenarios.timing import PRESETS
 
     return starting(incomplete, PRESETS)
 

@@ -148,8 +148,7 @@ class FlightFlags:
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with these flags; raises `UsageError` for invalid values."""
         from orchestration.components.building.fmus import native_twins
-        from orchestration.quadrotor.scenarios.presets import preset_timing
-        from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+        from orchestration.quadrotor.scenarios.timing import TIMING_KEYS, preset_timing
         from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice, choice_of
         from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 

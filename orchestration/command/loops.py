@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import in_columns, inform
+from orchestration.foundation.basics.unit_algebra import quantity
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.gallery import Figures

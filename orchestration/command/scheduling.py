@@ -11,8 +11,8 @@ from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError, shown
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import in_columns, inform
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.figures.names import expect_figure
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from orchestration.command.options import option
 from orchestration.command.printed_tables import TABLE, PrintedTable, decimals_of, with_interval
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
 from orchestration.command.study_flags import STORE, Dask, Out, StudyEngineFlag, TimeLimit, Workers
-from orchestration.experiments.studies.axis_labels import name_of, quantity_of
+from orchestration.experiments.studies.axes import name_of, quantity_of
 from orchestration.experiments.studies.shares import differences_of, laws_of, shares_of, with_chance
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.table import frame, units_in

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from orchestration.foundation.basics.number_text import some
+from orchestration.foundation.basics.unit_algebra import some
 
 if TYPE_CHECKING:
     from orchestration.components.checks.doctor.report import DoctorReport

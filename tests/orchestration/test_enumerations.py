@@ -18,7 +18,7 @@ from orchestration.components.fmi import opening
 from orchestration.experiments.studies.store import open_for_reading, store_path
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.simulation.requests.request import load_request
-from orchestration.simulation.requests.ssp import archive, writing
+from orchestration.simulation.requests.ssp import document, writing
 from orchestration.systems.system.model import System
 from quadcosim import SimulatorError, UsageError, changed, load_run, load_system, run
 from tests.commands import Main
@@ -158,7 +158,7 @@ def test_the_axis_of_a_study_has_names_for_values_and_so_has_its_table(maker: Pa
 
 @of_one_making
 def test_an_item_goes_through_an_ssp_and_back(system: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archive, "_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(document, "_cache", lambda: tmp_path / "cache")
     read = load_request(*writing.write_with_timing(system, tmp_path / "loop.ssp"))
     assert isinstance(read, System)
     assert read.components["maker"].parameters["shape"] == "two_lines"

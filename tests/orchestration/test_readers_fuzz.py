@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import quadcosim
 from orchestration.experiments.studies.study_file import load_study
-from orchestration.quadrotor.scenarios.presets import preset_timing
+from orchestration.quadrotor.scenarios.timing import preset_timing
 from orchestration.quadrotor.scenarios.wiring import REFERENCE
 from orchestration.simulation.requests.request import load_request
 from orchestration.simulation.requests.ssp import writing

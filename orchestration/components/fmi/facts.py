@@ -18,8 +18,8 @@ from orchestration.components.fmi.read_description import (
     clocks_of,
     declared_of,
 )
-from orchestration.foundation.basics.number_text import time_text
 from orchestration.foundation.basics.terminal import in_columns
+from orchestration.foundation.basics.unit_algebra import time_text
 
 _ORDER = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "local", "independent")
 _CAPABILITIES: Mapping[str, Any] = {

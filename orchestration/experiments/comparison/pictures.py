@@ -16,8 +16,7 @@ from orchestration.experiments.comparison.figures import BINS, Reach, basins, co
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
-from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.axes import Axis, quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps
 from orchestration.experiments.studies.figures import made, save
 from orchestration.experiments.studies.shares import GOOD

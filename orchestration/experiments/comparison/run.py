@@ -19,8 +19,8 @@ from orchestration.experiments.studies.swept import Swept
 from orchestration.experiments.studies.table import export, frame, units_in
 from orchestration.foundation.basics.errors import UsageError, expect_one_of
 from orchestration.foundation.basics.extras import explains_missing, needs
-from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.terminal import CountProgress, inform
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.results import html
 from orchestration.simulation.runs.run_directory import keep_run

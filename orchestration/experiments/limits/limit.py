@@ -10,8 +10,8 @@ from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import Bracket, Range, bisected, ends_of_good
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range

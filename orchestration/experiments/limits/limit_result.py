@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal
 
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity, some
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.results import html
 
 if TYPE_CHECKING:

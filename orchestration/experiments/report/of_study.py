@@ -16,8 +16,7 @@ from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, report_table, share_of, shares_along
 from orchestration.experiments.report.tracks import Tracks
-from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.axes import Axis, quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.store import note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, TEXTS, UNITS

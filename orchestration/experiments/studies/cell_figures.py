@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from orchestration.experiments.studies.axes import Axis, Value
-from orchestration.experiments.studies.axis_labels import SCALES, edges, name_of, quantity_of
+from orchestration.experiments.studies.axes import SCALES, Axis, Value, edges, name_of, quantity_of
 from orchestration.experiments.studies.shares import GOOD, TwoLaws, cells_of, differences_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from orchestration.experiments.studies.axes import Axis
-from orchestration.experiments.studies.axis_labels import SCALES, edges, quantity_of
+from orchestration.experiments.studies.axes import SCALES, Axis, edges, quantity_of
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
 from orchestration.foundation.basics.unit_algebra import after

@@ -16,11 +16,10 @@ from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.simulation.workers.provenance import machine, versions
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
-from orchestration.systems.system.connection import Connection, component_of, variable_of
+from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.files import Files, files_read_by
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import with_values
-from orchestration.systems.system.source import Source
 
 
 def run_key(system: System, files: Files, metrics: Sequence[OwnMetric] = ()) -> str:

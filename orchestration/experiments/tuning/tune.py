@@ -18,8 +18,8 @@ from orchestration.experiments.tuning.tuning_file import gains_text, load_tuning
 from orchestration.experiments.tuning.tuning_problem import Costs, SearchResult, TuningProblem, best_by_period
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
-from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.engines.master import BATCH
 from orchestration.simulation.results import html
 from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution, single_run_execution

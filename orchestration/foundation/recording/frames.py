@@ -46,7 +46,7 @@ def events(recording: Recording) -> "pd.DataFrame":
 SIGNALS, EVENTS = "signals.csv", "events.csv"
 
 
-def write_csv(recording: Recording, about: About, folder: Path) -> list[Path]:
+def as_csv(recording: Recording, about: About, folder: Path) -> list[Path]:
     """Write `signals.csv` and `events.csv` into a folder, chunk by chunk; returns their paths.
 
     Numbers have as many digits as are needed to read back the same values.

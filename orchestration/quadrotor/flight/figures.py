@@ -1,10 +1,9 @@
 """The figures of a flight by name."""
 
-from orchestration.quadrotor.flight.commands import commands
+from orchestration.quadrotor.flight.commands import commands, spectrum
 from orchestration.quadrotor.flight.errors import components_of_errors, errors
 from orchestration.quadrotor.flight.path import path
 from orchestration.quadrotor.flight.sliding import energy, phase
-from orchestration.quadrotor.flight.spectrum import spectrum
 from orchestration.simulation.figures.views import Drawing
 
 DRAWING = Drawing(

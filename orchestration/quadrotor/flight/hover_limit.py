@@ -6,11 +6,10 @@ from typing import cast
 
 from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.number_text import quantity
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.foundation.processes.passable import passable
-from orchestration.quadrotor.flight.hover import at_edge, at_hover
+from orchestration.quadrotor.flight.hover import NotSmooth, at_edge, at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.flight.plant_step import NotSmooth
 from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.requests.ranges import Varied

@@ -15,8 +15,15 @@ from orchestration.components.building import fmus
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.quadrotor.flight.hover import COORDINATES, STEP, at_hover, displaced, hover_of, measurement_at
-from orchestration.quadrotor.flight.plant_step import PlantStep
+from orchestration.quadrotor.flight.hover import (
+    COORDINATES,
+    STEP,
+    PlantStep,
+    at_hover,
+    displaced,
+    hover_of,
+    measurement_at,
+)
 from orchestration.quadrotor.scenarios import wiring
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.simulation.runs.prepared import prepared

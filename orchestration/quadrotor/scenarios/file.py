@@ -9,9 +9,8 @@ from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed, shown
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
-from orchestration.quadrotor.scenarios.presets import preset_timing
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.quadrotor.scenarios.timing import Timing, preset_timing
 from orchestration.quadrotor.scenarios.translation import SYSTEM, DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT

@@ -12,11 +12,11 @@ from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.quadrotor.scenarios.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
 from orchestration.systems.signals.library import AXES
 from orchestration.systems.signals.table_file import header_of
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import TOP
 from orchestration.systems.system.requirements import is_finite, require
-from orchestration.systems.system.source import Source
 
 Between = Literal["linear", "previous"]
 DRAG = 0.1

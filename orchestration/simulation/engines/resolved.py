@@ -24,11 +24,10 @@ from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
 from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants, instance_of
-from orchestration.systems.system.connection import variable_of
+from orchestration.systems.system.connection import MOTION, Source, variable_of
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.placement import tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.source import MOTION, Source
 
 Announce = Callable[[str], None]
 """Receives a line for each thing that is done before the run begins."""

@@ -16,10 +16,9 @@ from orchestration.foundation.basics.simulator import Floats, Simulator, Transfe
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.algebraic_loops import closing_of
 from orchestration.simulation.engines.condition import NEVER, Condition
-from orchestration.simulation.engines.connection_hold import Channel
 from orchestration.simulation.engines.initial import Dependencies
 from orchestration.simulation.engines.sources import Feed, SourceValues
-from orchestration.simulation.engines.wiring_by_index import Wires
+from orchestration.simulation.engines.wiring_by_index import Channel, Wires
 from orchestration.systems.schedule.instant_arrays import Cursor, Schedule
 from orchestration.systems.schedule.streams import NOISE, Streams
 from orchestration.systems.schedule.timetable import Timetable

@@ -14,10 +14,9 @@ from orchestration.components.fmi.native_instance import NativeInstance
 from orchestration.components.fmi.transfers import TransferCall, range_of
 from orchestration.foundation.basics.c_structures import address, constants, declared
 from orchestration.foundation.basics.simulator import Floats, Transfer
-from orchestration.simulation.engines.connection_hold import of_each
 from orchestration.simulation.engines.running_system import RunningSystem, SampledComponent
 from orchestration.simulation.engines.sources import Feed
-from orchestration.simulation.engines.wiring_by_index import Wires
+from orchestration.simulation.engines.wiring_by_index import Wires, of_each
 
 HEADER = Path(__file__).with_name("structures.h")
 

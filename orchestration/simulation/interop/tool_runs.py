@@ -20,9 +20,8 @@ from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child
 from orchestration.simulation.interop.assignment import AssignedLoop, assigned_loop
 from orchestration.simulation.interop.catalogue import Tool
-from orchestration.simulation.interop.copies import expect_traceable, traced_copy
 from orchestration.simulation.interop.job import Job
-from orchestration.simulation.interop.trace import Trace, read_trace
+from orchestration.simulation.interop.trace import Trace, expect_traceable, read_trace, traced_copy
 from orchestration.simulation.requests.ssp import writing
 from orchestration.simulation.requests.ssp.export import Part, complete_export, export_of
 from orchestration.simulation.runs.prepared import prepared

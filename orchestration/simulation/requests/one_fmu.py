@@ -17,10 +17,9 @@ from orchestration.foundation.basics.errors import UsageError, did_you_mean, lis
 from orchestration.simulation.engines.resolved import table_of
 from orchestration.systems.signals.table_file import TIME, header_of, read_rows
 from orchestration.systems.system.component import Component, Parameter, Sampling
-from orchestration.systems.system.connection import variable_of
+from orchestration.systems.system.connection import Source, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.proposal import component_names, experiment
-from orchestration.systems.system.source import Source
 
 LONG = 1e4
 """Default end [s] from which a run may take long"""

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from orchestration.foundation.basics.errors import Named, expect_one_of
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import instants_of
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.foundation.recording.recording import About, Event, Recording, events_of, rows_of
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.objectives import Metrics, judged_objective, unmet
@@ -234,7 +234,7 @@ class Result:
         """Write `signals.csv` and `events.csv` into a folder, with units in the column heads; returns their paths."""
         from orchestration.foundation.recording import frames  # not before: loads pyarrow
 
-        return frames.write_csv(self.recording, self.about, Path(folder))
+        return frames.as_csv(self.recording, self.about, Path(folder))
 
     @explains_missing
     def to_mat(self, path: str | Path) -> Path:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, shown
-from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.times import seconds
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.requests.request import (
     FMU,
     SSP,

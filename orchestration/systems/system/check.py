@@ -9,11 +9,10 @@ from orchestration.components.fmi.read_description import NUMERIC, Model, Variab
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name, listed
 from orchestration.systems.expressions.syntax import Name, names, parse, parts
 from orchestration.systems.system.component import Parameter
-from orchestration.systems.system.connection import Connection, component_of, variable_of
+from orchestration.systems.system.connection import MOTION, Connection, Source, component_of, variable_of
 from orchestration.systems.system.conversion import BECOMES, OtherQuantity, conversion
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.requirements import is_finite
-from orchestration.systems.system.source import MOTION, Source
 
 
 def check(system: System, models: Mapping[str, Model]) -> None:

@@ -1,11 +1,14 @@
-"""A connection of a system: the signals that travel together from one component to another, and their faults."""
+"""Connections: signals that travel together from one component to another, and their faults; sources of inputs."""
 
 from collections.abc import Mapping
 from dataclasses import field, replace
+from pathlib import Path
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
-from orchestration.systems.system.choices import Hold, Order, Spread
+from orchestration.foundation.basics.times import is_at_least
+from orchestration.systems.signals import WINDS
+from orchestration.systems.system.choices import Hold, Interpolation, Order, Outside, Spread
 from orchestration.systems.system.distribution import (
     Varying,
     is_random,
@@ -14,7 +17,7 @@ from orchestration.systems.system.distribution import (
     require_varying,
     spreads,
 )
-from orchestration.systems.system.requirements import is_finite, require
+from orchestration.systems.system.requirements import is_finite, require, require_not_negative, require_positive
 
 
 @record()
@@ -120,3 +123,135 @@ def component_of(variable: str) -> str:
 def variable_of(variable: str) -> str:
     """The variable of COMPONENT.VARIABLE."""
     return variable.partition(".")[2]
+
+
+MOTION = tuple(f"{each}.{axis}" for each in ("position", "velocity", "acceleration", "jerk", "snap") for axis in "xyz")
+"""The values of a motion, in its order"""
+
+
+@record()
+class Source:
+    """What drives inputs from outside: a constant, a file, white noise, a signal by name or the built-in trajectory.
+
+    Exactly one of `constant`, `file`, `noise`, `signal` and `trajectory` is given, except that `trajectory` may stand
+    beside a motion or a file. Motions are way-points and most signals. A motion feeds inputs whose names end with
+    QUANTITY.AXIS, as reference.position.x: position, velocity, acceleration, jerk and snap along x, y and z.
+    """
+
+    to: tuple[str, ...] = ()
+    """The inputs that it feeds, as COMPONENT.VARIABLE; empty for a motion that only objectives use."""
+    constant: float | None = None
+    """A constant value, in the unit of the inputs."""
+    file: Path | None = None
+    """The path of a CSV file with `time` [s] and one column for each input, named as the input without its component,
+    or with way-points; in a file, relative to its folder. Two rows of one time are a jump."""
+    interpolation: Interpolation = "linear"
+    """The values between the rows of a file: the line (linear), the row before (previous), or a smooth curve (spline)
+    through the rows as way-points, with columns x, y, z [m] and either `time` [s] or, optionally, `hold` [s] and
+    `speed` [m/s]."""
+    start_time: float | None = None
+    """The time of a file with a column for each input at which the run begins [s]; default: 0."""
+    outside: Outside | None = None
+    """The values of such a file before its first and after its last row: these rows' (held); default: it must cover
+    the run."""
+    within_steps: bool = False
+    """Whether FMUs for model exchange follow the lines between such rows also within their steps; default: they hold
+    the values that a step begins with."""
+    columns: tuple[str, ...] | None = None
+    """The columns of the file in the order of the inputs; default: the names of the inputs."""
+    noise: float | None = None
+    """The intensity [unit² s] of white noise: normal values with variance noise / period, each held over `period`."""
+    period: float | None = None
+    """The time for which each value of the noise is held [s]."""
+    signal: str | None = None
+    """The name of a motion (hover, step, circle, lemniscate, helix, paper), or of gusts of wind (dryden: north, east,
+    down)."""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """Parameters of the signal; for way-points without times, the limits `speed` [m/s] and `acceleration` [m/s²] that
+    determine the times."""
+    scale: float = 1.0
+    """The factor by which all values of a file or a signal are multiplied."""
+    trajectory: str | None = None
+    """The component that follows it, at those of the inputs SOURCE.position.x … SOURCE.snap.z that it has. Without a
+    signal or a file, the component follows its parameters trajectory.* or, if it has none, the paper's trajectory."""
+
+    @property
+    def is_built_in(self) -> bool:
+        """Whether it is the built-in trajectory of a component."""
+        return self.trajectory is not None and self.signal is None and self.file is None
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether it is a position with its derivatives up to snap."""
+        return self.interpolation == "spline" or (self.signal is not None and self.signal not in WINDS)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether it draws random numbers."""
+        return self.noise is not None or self.signal in WINDS
+
+    @property
+    def is_held(self) -> bool:
+        """Whether its values are constant from one instant to the next."""
+        return self.constant is not None or self.noise is not None
+
+    def signals(self, name: str) -> tuple[str, ...]:
+        """The recorded signals of the source called `name`: its inputs, with components where two have one name."""
+        if self.trajectory is not None or (self.is_motion and not self.to):
+            return tuple(f"{name}.position.{axis}" for axis in "xyz")
+        variables = [variable_of(end) for end in self.to]
+        fed = [end if variables.count(variable_of(end)) > 1 else variable_of(end) for end in self.to]
+        return tuple(each if each.startswith(f"{name}.") else f"{name}.{each}" for each in fed)
+
+    def __post_init__(self) -> None:
+        kinds = ("constant", "file", "noise", "signal", "trajectory")
+        given = [kind for kind in kinds if getattr(self, kind) is not None]
+        if given in (["file", "trajectory"], ["signal", "trajectory"]):
+            given.pop()
+        require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
+        if self.noise is not None:
+            require_not_negative(self, "noise")
+            require(self.period is not None, "period", "none", "how long each value is held, in seconds")
+            require_positive(self, "period")
+            require(is_at_least(self.period or 0.0, 1.0), "period", self.period, "at least a nanosecond")
+        else:
+            is_alone = self.trajectory is None or not self.to
+            require(is_alone, "to", ", ".join(self.to), "none: a trajectory is for objectives")
+            require(self.constant is None or is_finite(self.constant), "constant", self.constant, "a finite number")
+            require(self.period is None, "period", self.period, "none without noise")
+        self._expect_file()
+        self._expect_signal()
+
+    def _expect_file(self) -> None:
+        is_file, is_table = self.file is not None, self.file is not None and self.interpolation != "spline"
+        require(is_file or self.interpolation == "linear", "interpolation", self.interpolation, "none without a file")
+        if self.columns is not None:
+            require(is_table, "columns", ", ".join(self.columns), "none but for a file with a column for each input")
+            count = len(self.to)
+            require(len(self.columns) == count, "columns", len(self.columns), f"{count} names, one for each input")
+        for key in ("start_time", "outside"):
+            given = getattr(self, key)
+            require(is_table or given is None, key, given, "none but for a file with a column for each input")
+        follows = is_table and self.interpolation == "linear" and self.scale == 1.0
+        require(follows or not self.within_steps, "within_steps", "true", "false but for lines of a file as they are")
+        require(self.start_time is None or is_finite(self.start_time), "start_time", self.start_time, "a finite number")
+
+    def _expect_signal(self) -> None:
+        if self.signal is not None or self.interpolation == "spline":
+            from orchestration.systems.signals import library  # not before: the command line answers --help without it
+
+            if self.signal is None:
+                library.limits(self.parameters)
+            else:
+                library.make_signal(self.signal, self.parameters)
+        else:
+            given = ", ".join(self.parameters)
+            require(not self.parameters, "parameters", given, "none but for a signal by name, or way-points")
+        require(is_finite(self.scale), "scale", self.scale, "a finite number")
+        with_scale = self.scale == 1.0 or self.file is not None or self.signal is not None
+        require(with_scale, "scale", self.scale, "none but for a file or a signal by name")
+        if self.signal in WINDS:
+            require(len(self.to) == 3, "to", len(self.to), "3 inputs, for the wind along north, east and down")
+        if self.is_motion:
+            for end in self.to:
+                require(".".join(end.split(".")[-2:]) in MOTION, "to", end, "inputs that end in position.x … snap.z")

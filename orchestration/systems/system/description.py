@@ -4,16 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from orchestration.foundation.basics.errors import listed
-from orchestration.foundation.basics.number_text import time_text
 from orchestration.foundation.basics.terminal import in_columns
-from orchestration.foundation.basics.unit_algebra import in_brackets
+from orchestration.foundation.basics.unit_algebra import in_brackets, time_text
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Message, Task
-from orchestration.systems.system.connection import Connection, variable_of
+from orchestration.systems.system.connection import Connection, Source, variable_of
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks
-from orchestration.systems.system.source import Source
 
 MAX_NAMES_IN_CELL = 6
 """names in a cell; more are counted"""

@@ -12,12 +12,11 @@ from orchestration.foundation.basics.typed_tables import fields_of, parsed, sche
 from orchestration.systems.system.choices import Order
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, flattened, parameters_in
 from orchestration.systems.system.computers import Arrivals, Computer, Message, Network, Task
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed, for_each
 from orchestration.systems.system.requirements import is_number, require
-from orchestration.systems.system.source import Source
 
 Part = TypeVar("Part")
 

@@ -14,11 +14,10 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Network
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import SHARED
-from orchestration.systems.system.source import Source
 
 _NOTES = logging.getLogger("quadcosim")
 

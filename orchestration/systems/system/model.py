@@ -14,7 +14,7 @@ from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.expressions.syntax import is_number, parse
 from orchestration.systems.system.component import Component, expect_partitions, has_scheduled_instants
 from orchestration.systems.system.computers import Computer, Network
-from orchestration.systems.system.connection import Connection, component_of
+from orchestration.systems.system.connection import Connection, Source, component_of
 from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.placement import (
     expect_placement,
@@ -24,7 +24,6 @@ from orchestration.systems.system.placement import (
     with_tasks,
 )
 from orchestration.systems.system.requirements import require, require_positive
-from orchestration.systems.system.source import Source
 
 DIVERGED, TERMINATED = "diverged", "terminated"
 """Outcomes whatever the criterion is: the run left the region of validity, or an FMU ended it"""

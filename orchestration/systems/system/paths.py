@@ -9,11 +9,10 @@ from orchestration.foundation.basics.errors import UsageError, did_you_mean, pre
 from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Arrivals, Computer, Network
-from orchestration.systems.system.connection import Connection, component_of, variable_of
+from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.distribution import parsed_fields
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import SHARED
-from orchestration.systems.system.source import Source
 
 TOP = ("stop_time", "seed")
 _COMPONENTS, _PARAMETERS = "components.", ".parameters."

@@ -19,11 +19,11 @@ from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.theory.certificates.certificate import Cells, Certificate
+from orchestration.theory.certificates.certified_loop import LOSS, Varying
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.find_certificate import RADIUS, least_cost
 from orchestration.theory.certificates.margin import linear_loop_of
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import LOSS, Varying
 from orchestration.theory.certificates.verify_certificate import BITS, NotProven, verified
 
 FALL = 1e-4

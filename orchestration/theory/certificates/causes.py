@@ -17,10 +17,9 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import placed_messages, placed_tasks
 from orchestration.theory.certificates.breaking import FINE
-from orchestration.theory.certificates.certified_loop import CertifiedLoop
+from orchestration.theory.certificates.certified_loop import JITTER, LATENCY, SHIFT, CertifiedLoop, Varying
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import JITTER, LATENCY, SHIFT, Varying
 
 EXECUTION = "execution"
 

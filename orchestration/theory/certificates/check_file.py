@@ -11,10 +11,10 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.theory.certificates.causes import ScheduledLoop
 from orchestration.theory.certificates.certificate import Certificate, Checked, read_certificate
+from orchestration.theory.certificates.certified_loop import LOSS, Varying
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.margin import cause_in, expect_without_scheduler, linear_loop_of, varying_of
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import LOSS, Varying
 from orchestration.theory.stability.known_loops import rested
 
 ROUNDING = 1e-12

@@ -11,9 +11,8 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
-from orchestration.theory.certificates.certified_loop import CertifiedLoop
+from orchestration.theory.certificates.certified_loop import CertifiedLoop, Point
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
-from orchestration.theory.certificates.varying import Point
 from orchestration.theory.exact.branch import BranchEvent, Piece
 from orchestration.theory.exact.effects import ContinuousEffects, Places
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask

@@ -12,9 +12,9 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import needs
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import Share, ShareProgress, share_reporter
 from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.system.connection import variable_of
@@ -24,11 +24,10 @@ from orchestration.systems.system.placement import messages_by_connection, tasks
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.certificates.breaking import LONGEST_SEQUENCE, BreakingSequence, breaking_at, least_breaking
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
-from orchestration.theory.certificates.certified_loop import CertifiedLoop, certified_loop
+from orchestration.theory.certificates.certified_loop import DELAY, JITTER, LOSS, CertifiedLoop, Varying, certified_loop
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import DELAY, JITTER, LOSS, Varying
 from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.theory.stability.known_loops import rested

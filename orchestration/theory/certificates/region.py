@@ -17,9 +17,9 @@ from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results import display_names as labels
 from orchestration.theory.certificates import margin
 from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
+from orchestration.theory.certificates.certified_loop import LOSS
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import LOSS
 
 COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""

@@ -10,10 +10,19 @@ from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.theory.certificates.certified_loop import CertifiedLoop
+from orchestration.theory.certificates.certified_loop import (
+    DELAY,
+    JITTER,
+    LATENCY,
+    LOSS,
+    SHIFT,
+    CertifiedLoop,
+    Draws,
+    Point,
+    Varying,
+)
 from orchestration.theory.certificates.course import Courses, PieceAt, Steps, time_at
 from orchestration.theory.certificates.family import Letter, LoopFamily
-from orchestration.theory.certificates.varying import DELAY, JITTER, LATENCY, LOSS, SHIFT, Draws, Point, Varying
 from orchestration.theory.exact.random_times import (
     ATTOSECONDS,
     RandomLink,

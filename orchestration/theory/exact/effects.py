@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.simulation.engines.connection_hold import of_each
+from orchestration.simulation.engines.wiring_by_index import of_each
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.connection import Connection, component_of, variable_of
 from orchestration.systems.system.model import System

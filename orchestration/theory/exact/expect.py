@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.number_text import quantity, some
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.expressions.syntax import Call

@@ -15,9 +15,8 @@ from orchestration.systems.expressions.operators import OPERATORS, applied
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined, reductions
 from orchestration.systems.expressions.syntax import Call, names
 from orchestration.systems.system.check import AT_REST
-from orchestration.systems.system.connection import component_of, variable_of
+from orchestration.systems.system.connection import Source, component_of, variable_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.source import Source
 from orchestration.theory.stability.loop_at_rest import AtRest
 
 STEP = 1.0

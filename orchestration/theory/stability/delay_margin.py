@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System

@@ -13,9 +13,9 @@ import numpy as np
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import progress_bar, warn
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.system.distribution import lowest

@@ -11,9 +11,9 @@ import numpy as np
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named

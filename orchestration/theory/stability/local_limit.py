@@ -11,7 +11,7 @@ from itertools import groupby
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.bisection import Bracket, Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
-from orchestration.foundation.basics.number_text import some
+from orchestration.foundation.basics.unit_algebra import some
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.excitation import ImpreciseError

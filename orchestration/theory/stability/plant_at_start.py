@@ -9,8 +9,8 @@ from orchestration.components.fmi.adapted import AdaptedInstance
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import Model, declared_of, read_model
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
-from orchestration.foundation.basics.number_text import some
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.simulation.runs.prepared import set_parameters

@@ -12,10 +12,10 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity, some
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of

@@ -8,8 +8,8 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.number_text import quantity
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.theory.stability.frequency import expect_decided, receivers_of
 from orchestration.theory.stability.linearise import Linearised, clock_of, known_to, linearise

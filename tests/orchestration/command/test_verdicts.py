@@ -9,7 +9,7 @@ import pytest
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.experiments.limits.limit_result import Limit
 from orchestration.foundation.basics import terminal
-from orchestration.foundation.basics.number_text import quantity
+from orchestration.foundation.basics.unit_algebra import quantity
 from quadcosim import Expected, Linearised
 
 GOOD = Evaluation(value=0.035250000000000004, outcome="settled", divergence_time=None, flew=1, runs=1, share=None)

@@ -12,9 +12,8 @@ from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.arrays import BatchArrays, BatchStructures
 from orchestration.simulation.engines.batch.run_numbers import RunNumbers, end_of
 from orchestration.simulation.engines.batch.shape import Shape
-from orchestration.simulation.engines.connection_hold import of_each
 from orchestration.simulation.engines.sources import SourceValues
-from orchestration.simulation.engines.wiring_by_index import clock_of
+from orchestration.simulation.engines.wiring_by_index import clock_of, of_each
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.model import System
 

@@ -27,10 +27,9 @@ from orchestration.systems.expressions.syntax import Call, Node, names, names_jo
 from orchestration.systems.schedule.plan import is_plain
 from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.computers import Network
-from orchestration.systems.system.connection import Connection, component_of, variable_of
+from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import placed_messages
-from orchestration.systems.system.source import Source
 
 Places = npt.NDArray[np.int64]
 _TAKES = {"Boolean": ONE_LANE.TRUTH, "Integer": ONE_LANE.WHOLE, "Enumeration": ONE_LANE.WHOLE}

@@ -15,7 +15,7 @@ from orchestration.simulation.engines.resolved import table_of
 from orchestration.simulation.engines.wasm.settings import Settings
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
-from orchestration.systems.system.source import MOTION, Source
+from orchestration.systems.system.connection import MOTION, Source
 
 
 def key_text(key: Sequence[int]) -> str:

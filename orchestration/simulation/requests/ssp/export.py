@@ -13,10 +13,9 @@ from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.check import AT_REST, check, connect_references
 from orchestration.systems.system.component import Component, Parameter, Sampling
-from orchestration.systems.system.connection import Connection, component_of, variable_of
+from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms
-from orchestration.systems.system.source import Source
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,7 @@ from pathlib import Path
 from fmu_kit.units import BASE
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.unit_algebra import BaseUnits
-from orchestration.simulation.requests.ssp.archive import Package
-from orchestration.simulation.requests.ssp.document import Read, all_of, read
+from orchestration.simulation.requests.ssp.document import Package, Read, all_of, read
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.conversion import Conversion
 

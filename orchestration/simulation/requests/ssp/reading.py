@@ -10,8 +10,7 @@ from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, listed
 from orchestration.foundation.basics.unit_algebra import BaseUnits
-from orchestration.simulation.requests.ssp.archive import open_package
-from orchestration.simulation.requests.ssp.document import read
+from orchestration.simulation.requests.ssp.document import open_package, read
 from orchestration.simulation.requests.ssp.parameters import Value
 from orchestration.simulation.requests.ssp.structure import Node, Path_, Structure, Wire, dotted, structure_of
 from orchestration.simulation.requests.ssp.timing import expect_tables, from_text

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.unit_algebra import BaseUnits
-from orchestration.simulation.requests.ssp.archive import Package
-from orchestration.simulation.requests.ssp.document import Read, all_of
+from orchestration.simulation.requests.ssp.document import Package, Read, all_of
 from orchestration.simulation.requests.ssp.parameters import Value, definitions_in, transformation, values_of
 from orchestration.simulation.requests.ssp.timing import ANNOTATION
 from orchestration.systems.system.conversion import Conversion

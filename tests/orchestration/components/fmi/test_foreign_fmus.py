@@ -23,9 +23,8 @@ from orchestration.foundation.processes import subprocesses
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.system.component import Component, Sampling
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.model import Criterion, System
-from orchestration.systems.system.source import Source
 from tests.fmus.archive import files_of
 from tests.fmus.damage import write_fmu
 from tests.orchestration.components.fmi.small import BINARY, CLOCK, SIZE, needs_compiler, nothing_known, small

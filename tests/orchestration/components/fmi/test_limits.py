@@ -10,7 +10,7 @@ from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes import resource_limits
 from orchestration.foundation.processes.resource_limits import FileLimit
-from orchestration.simulation.requests.ssp.archive import Package, open_package
+from orchestration.simulation.requests.ssp.document import Package, open_package
 from tests.orchestration.components.fmi.small import needs_compiler, small
 
 SQUARE = """<Float64 name="A" valueReference="9" causality="local"><Dimension start="100000"/>

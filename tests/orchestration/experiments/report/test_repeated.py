@@ -8,7 +8,7 @@ import pytest
 from orchestration.experiments.report.model import CellMap, MapCell
 from orchestration.experiments.report.repeated import RunsInCells, maps_of_both, repeated_maps, runs_in_cells
 from orchestration.experiments.report.tables import ColumnAxis
-from orchestration.experiments.studies.axis_labels import quantity_of
+from orchestration.experiments.studies.axes import quantity_of
 from orchestration.experiments.studies.shares import interval_of_difference
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.statistics import wilson

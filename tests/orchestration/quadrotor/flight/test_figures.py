@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 
 import quadcosim
 from orchestration.quadrotor.flight import commands
+from orchestration.quadrotor.flight.commands import welch
 from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from orchestration.quadrotor.flight.path import extent
 from orchestration.quadrotor.flight.sliding import surface
-from orchestration.quadrotor.flight.spectrum import welch
 from orchestration.simulation.figures import signals
 from orchestration.simulation.figures.lines import clip_peaks
 from orchestration.simulation.figures.names import COLUMNS

@@ -3,7 +3,7 @@
 import pytest
 
 import quadcosim
-from orchestration.quadrotor.scenarios.presets import PRESETS, preset_timing
+from orchestration.quadrotor.scenarios.timing import PRESETS, preset_timing
 from quadcosim import Scenario, Timing, UsageError
 
 

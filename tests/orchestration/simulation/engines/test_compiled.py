@@ -38,10 +38,9 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule import instant_arrays
 from orchestration.systems.system.component import Component, Sampling
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import Criterion, System
-from orchestration.systems.system.source import Source
 from tests.extent import tries
 from tests.native import assert_the_same
 from tests.orchestration.components.fmi.small import needs_compiler, small

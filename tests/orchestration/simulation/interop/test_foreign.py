@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.simulation.interop import copies
+from orchestration.simulation.interop import trace
 from orchestration.simulation.interop.catalogue import chosen
 from orchestration.simulation.interop.compare import agreements
 from orchestration.simulation.interop.table import TOLERANCE
@@ -125,11 +125,11 @@ def test_two_copies_of_one_fmu_are_told_apart_by_a_host_that_goes_by_the_guid(tm
 def test_what_stands_in_the_way_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(fmu: Path) -> str:
         with pytest.raises(UsageError) as refusal:
-            copies.expect_traceable(fmu)
+            trace.expect_traceable(fmu)
         return str(refusal.value).removeprefix(f"{fmu}: ")
 
     assert refused(small(tmp_path / "3", fmi=3)) == "FMI 3.0; expected FMI 2.0 to trace it in other masters"
     empty = described(tmp_path, "Empty", outputs={"y": "Real"})
     assert refused(empty) == "has no binaries/linux64/Empty.so; expected one to run it here"
-    monkeypatch.setattr(copies, "compiler", lambda: None)
+    monkeypatch.setattr(trace, "compiler", lambda: None)
     assert refused(empty).startswith("expected a C compiler called cc, on Linux (x86_64), to trace it in other masters")

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT
-from orchestration.simulation.interop.copies import log_of, traced_copy
-from orchestration.simulation.interop.trace import Trace, read_trace
+from orchestration.simulation.interop.trace import Trace, log_of, read_trace, traced_copy
 from quadcosim import QuadcosimError, Result, Scenario, load_run, run
 from tests.orchestration.experiments.studies.common import quadcosim
 from tests.orchestration.simulation.interop.common import LOOP

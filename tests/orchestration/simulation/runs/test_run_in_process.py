@@ -22,9 +22,8 @@ from orchestration.simulation.runs.pause import resume, run_until
 from orchestration.simulation.runs.run_directory import load_run
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.component import Component
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.model import System
-from orchestration.systems.system.source import Source
 from tests.commands import Main
 from tests.orchestration.components.fmi.small import needs_compiler, small
 

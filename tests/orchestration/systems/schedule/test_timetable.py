@@ -12,8 +12,8 @@ from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.plan import MAX_TIME, FixedStep
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.source import Source
 from tests.orchestration.simulation.engines.stubs import continuous, sampled, system, wire
 
 MS = 1_000_000

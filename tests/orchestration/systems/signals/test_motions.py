@@ -11,7 +11,7 @@ from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.simulation.engines.sources import EXACT, motion_values
 from orchestration.systems.signals.library import KINDS, SIGNALS, make_signal
 from orchestration.systems.signals.motions import MOTIONS, Circle, Helix, Lemniscate, Motion, Paper, Step
-from orchestration.systems.system.source import MOTION
+from orchestration.systems.system.connection import MOTION
 from quadcosim import UsageError
 from tests.scalars import PRECISE
 

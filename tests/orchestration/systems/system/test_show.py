@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestration.foundation.basics.number_text import time_text
+from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.simulation.figures import diagram
 from orchestration.systems.system.description import as_text
 from orchestration.systems.system.file import load_system

@@ -14,10 +14,19 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates.breaking import unstable_sequence
-from orchestration.theory.certificates.certified_loop import CertifiedLoop, certified_loop
+from orchestration.theory.certificates.certified_loop import (
+    BOXES,
+    DELAY,
+    JITTER,
+    LATENCY,
+    LOSS,
+    SHIFT,
+    CertifiedLoop,
+    Varying,
+    certified_loop,
+)
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import BOXES, DELAY, JITTER, LATENCY, LOSS, SHIFT, Varying
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.period_map import growth_of_loop
 from tests.examples.common import example

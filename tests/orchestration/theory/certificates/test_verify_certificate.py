@@ -18,11 +18,11 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.theory.certificates import verify_certificate
 from orchestration.theory.certificates.breaking import least_breaking
 from orchestration.theory.certificates.certificate import Certificate, read_certificate
+from orchestration.theory.certificates.certified_loop import LOSS, Varying
 from orchestration.theory.certificates.check_file import AnotherLoop, expect_same_family
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.find_certificate import find_certificate
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.certificates.varying import LOSS, Varying
 from orchestration.theory.certificates.verify_certificate import NotProven, is_positive, verified
 from tests.orchestration.theory.certificates.loops import (
     HOVER_A,

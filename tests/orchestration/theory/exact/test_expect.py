@@ -13,8 +13,8 @@ from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.files import files_of
-from orchestration.systems.system.source import Source
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
 from orchestration.theory.exact.timing import sampled_tasks

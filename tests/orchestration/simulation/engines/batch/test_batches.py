@@ -14,10 +14,10 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.systems.schedule import schedule_cache
 from orchestration.systems.system.component import Component
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.files import located as with_files
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.source import Source
 from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.simulation.engines.batch.lanes import LOOP, assert_the_same_numbers, in_lanes, shape_of
 from tests.orchestration.simulation.engines.test_compiled import Kept, of, ran

@@ -10,9 +10,9 @@ import pytest
 
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.systems.expressions.reductions import REDUCTIONS
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.model import Criterion
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.source import Source
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import LOOP, assert_the_same_numbers
 from tests.orchestration.simulation.engines.test_compiled import Kept, of, ran

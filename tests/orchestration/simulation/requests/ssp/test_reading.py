@@ -9,7 +9,7 @@ import pytest
 from fmu_kit.archive import write_archive
 from orchestration.components.fmi.read_description import read_model
 from orchestration.simulation.requests.request import load_request
-from orchestration.simulation.requests.ssp import archive, writing
+from orchestration.simulation.requests.ssp import document, writing
 from orchestration.systems.system.check import check
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.model import System
@@ -381,7 +381,7 @@ def test_unsupported_elements_are_rejected_by_name_in_one_line(
 def test_an_archive_that_is_none_or_has_no_structure_is_rejected(
     content: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(archive, "_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(document, "_cache", lambda: tmp_path / "cache")
     path = tmp_path / "loop.ssp"
     if content is None:
         write_archive(path, {"other.txt": b""}, first="other.txt")
@@ -397,7 +397,7 @@ def test_an_archive_that_is_none_or_has_no_structure_is_rejected(
 def test_the_quadrotor_s_ssp_is_the_quadrotor_with_its_timing_on_top(
     built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
 ) -> None:
-    monkeypatch.setattr(archive, "_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(document, "_cache", lambda: tmp_path / "cache")
     scenario = Scenario().with_fmus(plant=built["QuadrotorPlant"], controller=built["UnifiedController"])
     scenario = scenario.with_changes(stop_time=0.2, timing={"plant_interval": 0.005, "clock": "fmu"})
     path = writing.write(scenario, tmp_path / "loop.ssp")

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from orchestration.simulation.requests.request import load_request
-from orchestration.simulation.requests.ssp import archive, writing
+from orchestration.simulation.requests.ssp import document, writing
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.simulation import run
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.model import Criterion, System
-from orchestration.systems.system.source import Source
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.experiments.studies.common import error_line, one_line
@@ -21,7 +21,7 @@ from tests.places import EXAMPLES
 
 @pytest.fixture(autouse=True)
 def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archive, "_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(document, "_cache", lambda: tmp_path / "cache")
 
 
 def bits(result: Result) -> dict[str, bytes]:
@@ -86,7 +86,7 @@ def load_structure(ssp: Path, folder: Path) -> Path:
     """Unpacked, its document."""
     with zipfile.ZipFile(ssp) as opened:
         opened.extractall(folder)
-    return folder / archive.STRUCTURE
+    return folder / document.STRUCTURE
 
 
 def test_additional_timing_is_used(tmp_path: Path) -> None:
