@@ -208,10 +208,15 @@ def _difference(
     panel.set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     if metric != GOOD:
         return
+    for row in found.to_dict("records"):  # the sign, which colours do not show in grey
+        if row["difference"]:
+            x, y = (float(quantity.of(row[axis.name])) for axis, quantity in zip(axes, quantities))
+            color = "white" if abs(row["difference"]) > HALF else BLACK
+            panel.text(x, y, "+" if row["difference"] > 0.0 else "−", color=color, ha="left", va="bottom")
     marked = found[(found["low"] > 0.0) | (found["high"] < 0.0)]
     if len(marked):
-        x, y = (quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes))
-        panel.plot(x, y, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
+        places_of_dots = [quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes)]
+        panel.plot(*places_of_dots, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
 
 
 def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str:

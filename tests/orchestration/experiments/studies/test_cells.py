@@ -162,6 +162,7 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     shown = set(zip(*(map(float, np.round(data, 6)) for data in marks.get_data())))  # type: ignore[arg-type]
     assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
     assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
+    assert [text.get_text() for text in figure.axes[2].texts] == ["−"] * 6, "the second law is worse everywhere"
     assert figure.get_suptitle() == (
         "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; dots: Newcombe's for pairs excludes 0"
     )
