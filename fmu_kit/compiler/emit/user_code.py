@@ -108,10 +108,15 @@ class UserCode:
 # Names of the user's own variables must not be hidden by those of the functions here.
 _CXX = """\
 template <class T> struct quadcosim_kind {
-    static T of(double x) { return (T)(long long)(x < 0.0 ? x - 0.5 : x + 0.5); }
+    static T of(double x) { return x > -9e18 && x < 9e18 ? (T)(long long)(x < 0.0 ? x - 0.5 : x + 0.5) : (T)0; }
+    static bool has(double x, double stored) { return stored - x >= -0.5 && stored - x <= 0.5; }
 };
-template <> struct quadcosim_kind<float> { static float of(double x) { return (float)x; } };
-template <> struct quadcosim_kind<double> { static double of(double x) { return x; } };
+template <class T> struct quadcosim_real {
+    static T of(double x) { return (T)x; }
+    static bool has(double, double) { return true; }
+};
+template <> struct quadcosim_kind<float> : quadcosim_real<float> {};
+template <> struct quadcosim_kind<double> : quadcosim_real<double> {};
 template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
 template <class T> struct quadcosim_one { enum { is = 1 }; };
 template <class T> struct quadcosim_one<T *> { enum { is = 0 }; };
@@ -121,8 +126,8 @@ extern "C" void quadcosim_init(void);
 extern "C" void quadcosim_after_parameters(void);
 extern "C" void quadcosim_step(void);
 extern "C" void quadcosim_run(unsigned);
-extern "C" void quadcosim_set_inputs(const double *, unsigned);
-extern "C" void quadcosim_set_parameters(const double *, unsigned);
+extern "C" unsigned quadcosim_set_inputs(const double *, unsigned);
+extern "C" unsigned quadcosim_set_parameters(const double *, unsigned);
 extern "C" void quadcosim_get_outputs(double *, unsigned);
 extern "C" void quadcosim_get_all(double *, unsigned);
 extern "C" void __cxa_pure_virtual(void) { __builtin_trap(); } /* the runtime library's would take more of it */
@@ -138,11 +143,10 @@ def user_code(code: UserCode) -> str:
     lines += _function(code, "quadcosim_init", code.init)
     lines += _function(code, "quadcosim_after_parameters", code.after_parameters)
     lines += _step(code)
-    to_code = _TO_CXX if code.is_cxx else _TO_C
-    lines += _each(code, "set_inputs", "const ", code.having("input"), to_code)
-    lines += _each(code, "set_parameters", "const ", code.having("parameter"), to_code)
-    lines += _each(code, "get_outputs", "", code.having("output"), _FROM_CODE)
-    lines += _each(code, "get_all", "", code.places, _FROM_CODE)
+    lines += _set(code, "set_inputs", "input")
+    lines += _set(code, "set_parameters", "parameter")
+    lines += _get(code, "get_outputs", code.having("output"))
+    lines += _get(code, "get_all", code.places)
     return "\n".join([*lines, ""])
 
 
@@ -219,21 +223,44 @@ _TO_C = (
     "{{ const double quadcosim_x = {value}; "
     "if (_Generic(({lvalue}), float: 1, double: 1, long double: 1, default: 0)) {lvalue} = quadcosim_x; "
     # Integers are rounded, also those in bit fields, of which only the compiler knows that they are some.
-    "else {lvalue} = (long long)(quadcosim_x < 0.0 ? quadcosim_x - 0.5 : quadcosim_x + 0.5); }}"
+    "else {{ if (quadcosim_x > -9e18 && quadcosim_x < 9e18) "
+    "{lvalue} = (long long)(quadcosim_x < 0.0 ? quadcosim_x - 0.5 : quadcosim_x + 0.5); "
+    "const double quadcosim_off = (double)({lvalue}) - quadcosim_x; "
+    "if (!(quadcosim_off >= -0.5 && quadcosim_off <= 0.5)) return {number}; }} }}"
 )
-_TO_CXX = "{{ const double quadcosim_x = {value}; ({lvalue}) = quadcosim_kind<decltype({lvalue})>::of(quadcosim_x); }}"
-_FROM_CODE = "{value} = (double)({lvalue});"
+_TO_CXX = (
+    "{{ const double quadcosim_x = {value}; typedef quadcosim_kind<decltype({lvalue})> quadcosim_type; "
+    "({lvalue}) = quadcosim_type::of(quadcosim_x); "
+    "if (!quadcosim_type::has(quadcosim_x, (double)({lvalue}))) return {number}; }}"
+)
 
 
-def _each(code: UserCode, name: str, qualifier: str, places: Sequence[Place], form: str) -> Iterator[str]:
-    """A function that passes each of some variables to the code or from it."""
-    yield f"void quadcosim_{name}({qualifier}double *quadcosim_values, unsigned quadcosim_apart) {{"
+def _set(code: UserCode, name: str, causality: Causality) -> Iterator[str]:
+    """A function that passes variables to the code, up to the first that its type in C does not hold, if any.
+
+    It returns the number of that variable among them, or how many they are.
+    """
+    of_causality = code.having(causality)
+    form = _TO_CXX if code.is_cxx else _TO_C
+    yield from _each(
+        code, f"unsigned quadcosim_{name}(const double", of_causality, form, f"return {len(of_causality)};"
+    )
+
+
+def _get(code: UserCode, name: str, places: Sequence[Place]) -> Iterator[str]:
+    """A function that passes variables from the code."""
+    yield from _each(code, f"void quadcosim_{name}(double", places, "{value} = (double)({lvalue});")
+
+
+def _each(code: UserCode, head: str, places: Sequence[Place], form: str, last: str = "") -> Iterator[str]:
+    yield f"{head} *quadcosim_values, unsigned quadcosim_apart) {{"
     yield "(void)quadcosim_values; (void)quadcosim_apart;"
     for number, place in enumerate(places):
         value = f"quadcosim_values[{number} * quadcosim_apart]"
         check = (_IS_NUMBER_CXX if code.is_cxx else _IS_NUMBER).format(lvalue=place.lvalue.text, told=_refusal(place))
-        yield from _at(code, place.lvalue, check + form.format(value=value, lvalue=place.lvalue.text))
-    yield "}"
+        passing = form.format(value=value, lvalue=place.lvalue.text, number=number)
+        yield from _at(code, place.lvalue, check + passing)
+    yield last + "}"
 
 
 def _refusal(place: Place) -> str:

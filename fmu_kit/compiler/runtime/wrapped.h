@@ -8,13 +8,14 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Variables are `apart` places apart, of which the first is given. */
+/* Variables are `apart` places apart, of which the first is given. Those that set some return the number, among these,
+   of the first whose value its type in C does not hold, or how many they are. */
 void quadcosim_init(void);
 void quadcosim_after_parameters(void);
 void quadcosim_step(void);
 void quadcosim_run(unsigned task);
-void quadcosim_set_inputs(const double *values, unsigned apart);
-void quadcosim_set_parameters(const double *values, unsigned apart);
+unsigned quadcosim_set_inputs(const double *values, unsigned apart);
+unsigned quadcosim_set_parameters(const double *values, unsigned apart);
 void quadcosim_get_outputs(double *values, unsigned apart);
 
 #if STATE_BYTES > 0
@@ -62,7 +63,9 @@ static unsigned begin_code(double *values, unsigned apart, double *state)
 {
     put_first_state();
     quadcosim_init();
-    quadcosim_set_parameters(values + FIRST_PARAMETER * apart, apart);
+    const unsigned parameter = FIRST_PARAMETER + quadcosim_set_parameters(values + FIRST_PARAMETER * apart, apart);
+    if (parameter != VARIABLES)
+        return parameter;
     quadcosim_after_parameters();
     values[KEPT_STALE * apart] = 0.0;
     return read_outputs(values, apart, state);
@@ -75,7 +78,9 @@ enum { ALL_DUE = -1 };
 static unsigned step_code(double *values, unsigned apart, double *state, int task)
 {
     put_state(state);
-    quadcosim_set_inputs(values, apart);
+    const unsigned input = quadcosim_set_inputs(values, apart);
+    if (input != FIRST_OUTPUT)
+        return input;
     if (task == ALL_DUE)
         quadcosim_step();
     else

@@ -199,6 +199,15 @@ def test_integers_are_rounded_and_floats_kept(tick: Path) -> None:
     assert np.diff(found).tolist() == [2.0, -1.0, 1.0]  # the counter adds one each time
 
 
+@pytest.mark.parametrize("given", [32768.0, -1e300], ids=["one too many", "beyond all integers"])
+def test_an_input_that_its_integer_does_not_hold_is_refused(tick: Path, given: float) -> None:
+    flight = Flight(tick)
+    flight.given[:] = 0.0, given
+    flight.write()
+    with pytest.raises(Exception, match=r"whole = .*: expected a value that its integer type in C holds; what clips"):
+        flight.instance.step(flight.time, 1.0)
+
+
 def test_start_values_come_from_the_code_and_its_constants_are_units(pd: Path) -> None:
     model = read_model(pd)
     assert {name: each.start for name, each in model.variables.items() if each.causality == "parameter"} == {
@@ -320,7 +329,7 @@ period = 0.05
 sources = ["{source}"]
 declare = '''
 {declare}
-static double x, v, u;
+static double x, u;
 '''
 step = "u = law(x, v);"
 [inputs]
@@ -370,7 +379,7 @@ slow = "slow"
 """
 
 
-def law_of(folder: Path, source: str, text: str, declare: str = "double law(double, double);") -> Path:
+def law_of(folder: Path, source: str, text: str, declare: str = "double law(double, double); static double v;") -> Path:
     """The FMU of u = -x - v, in another language."""
     (folder / source).write_text(text)
     if source.endswith(".rs"):
@@ -389,9 +398,12 @@ def test_code_that_takes_memory_from_the_heap_saves_no_state(tmp_path: Path) -> 
 
 
 def test_cxx_goes_the_same_way(tmp_path: Path) -> None:
-    fmu = law_of(tmp_path, "law.cpp", CXX)
+    declare = "double law(double, double); static struct { unsigned low : 3; } bits;\n#define v bits.low"
+    fmu = law_of(tmp_path, "law.cpp", CXX, declare)
     assert read_model(fmu).saves_state
-    assert _output(fmu, {"x": 2.0, "v": 1.0}) == -3.0
+    assert _output(fmu, {"x": 2.0, "v": 1.4}) == -3.0
+    with pytest.raises(Exception, match=r"v = 8\.0: expected a value that its integer type in C holds"):
+        _output(fmu, {"x": 2.0, "v": 8.0})
 
 
 @pytest.mark.skipif(shutil.which("rustc") is None, reason="needs rustc")
