@@ -47,8 +47,6 @@ class SampledRest:
     rest: Rest
     period: float
     """Interval from sample to sample [s]"""
-    factor: float
-    """Factor on the pulses"""
     excitation: Excitation
     count: int
     """Samples over which it is linear"""
@@ -67,7 +65,7 @@ class SampledRest:
         rest.fmu.restore(self.excitation.rest.saved)
         excitation = Excitation(rest)
         rungs = max(FEWEST_LIFTED, SAMPLES // samples)
-        count = _choose_pulse(excitation, [Rung(samples, self.period)] * (2 * rungs), self.factor)
+        count = _choose_pulse(excitation, [Rung(samples, self.period)] * (2 * rungs))
         rest.fmu.restore(excitation.rest.saved)
         fmu = LiftedInstance(rest, samples, self.period)
         lifted = Excitation(lifted_rest(rest, fmu, samples))
@@ -75,25 +73,24 @@ class SampledRest:
         return LiftedTangent(_tangent(lifted, Rung(1, samples * self.period), count), rest, fmu, samples)
 
 
-def of_samples(rest: Rest, period: float, factor: float) -> SampledRest:
-    """A component that is sampled every `period` [s]; the pulses chosen are multiplied by `factor`.
+def of_samples(rest: Rest, period: float) -> SampledRest:
+    """A component that is sampled every `period` [s].
 
     Raises `UsageError` where its response differs from sample to sample, and does not repeat.
     """
     excitation, sample = Excitation(rest), Rung(1, period)
-    count = _choose_pulse(excitation, [sample] * (2 * SAMPLES), factor)
+    count = _choose_pulse(excitation, [sample] * (2 * SAMPLES))
     samples = _samples_until_alike(excitation, sample)
-    return SampledRest(rest=rest, period=period, factor=factor, excitation=excitation, count=count, samples=samples)
+    return SampledRest(rest=rest, period=period, excitation=excitation, count=count, samples=samples)
 
 
-def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung], factor: float) -> int:
+def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung]) -> int:
     """Choose the pulses, large ones for a component that rounds coarsely; the rungs over which it is linear."""
     count = excitation.choose_pulse(rungs)
     excitation.expect_response(rungs[:FEW])
     if excitation.rounds_coarsely(rungs[:FEW]):
         excitation.use_large_pulses(rungs[:FEW])
         count = len(rungs)
-    excitation.pulse *= factor
     return count
 
 
@@ -121,7 +118,7 @@ def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
     return min(found, key=lambda one: one.accuracy)
 
 
-def in_continuous_time(rest: Rest, period: float, step: float, factor: float, *, unit: float | None = None) -> Tangent:
+def in_continuous_time(rest: Rest, period: float, step: float, *, unit: float | None = None) -> Tangent:
     """The tangent of a component in a loop of a `period`, whose own step is `step` [s]; else as `of_samples`.
 
     Where the component only takes steps of one length, that is its `unit`.
@@ -133,7 +130,6 @@ def in_continuous_time(rest: Rest, period: float, step: float, factor: float, *,
         if linear_until < 0.0 or end > HORIZONS[1] * period:  # the pulse for the second length does for the first
             probes = _rungs(np.geomspace(first, 2.0 * max(end, HORIZONS[1] * period), PROBES), longest, unit)
             linear = probes[: excitation.choose_pulse(probes)]
-            excitation.pulse *= factor
             linear_until = 0.5 * sum(rung.duration for rung in linear) if len(linear) < len(probes) else np.inf
         ladder = _rungs(_points(first, min(end, linear_until)), longest, unit)
         tangent, before = Tangent(copy(excitation), ladder, len(ladder), unit=unit), found

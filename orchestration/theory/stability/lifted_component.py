@@ -5,6 +5,7 @@ these samples respond alike each time, with the inputs and outputs of each as si
 """
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Any, cast
 
 import numpy as np
@@ -119,3 +120,10 @@ class LiftedTangent(LinearSimulator):
             return None
         again = self.whole.about(lifted_rest(rest, self._fmu, self.samples))
         return None if again is None else LiftedTangent(again, rest, self._fmu, self.samples)
+
+    def with_pulse(self, factor: float) -> "LiftedTangent":
+        """As that of `Tangent`."""
+        again = copy(self)
+        again.whole = self.whole.with_pulse(factor)
+        again.state = np.zeros(len(again.whole.state))
+        return again

@@ -7,6 +7,7 @@ part of a loop. Restored to such states, the component shows the derivatives of 
 has to predict the response to a random input.
 """
 
+import sys
 from collections.abc import Sequence
 from copy import copy
 
@@ -49,15 +50,23 @@ SINGLE = float(np.finfo(np.float32).eps)
 class Tangent(LinearSimulator):
     """A component about rest; as a `Simulator` it is linear, and begins at rest.
 
-    The rungs of `ladder` produce and identify states, at `fewest` rungs at least. Where the component only takes steps
-    of a `unit`, these are whole numbers of it. Raises `UsageError` for a component with more states than these show.
+    The rungs of `ladder` produce and identify states, at `fewest` rungs at least, and `most` states, the strongest.
+    Where the component only takes steps of a `unit`, these are whole numbers of it. Raises `UsageError` for a component
+    with more states than these show.
     """
 
     def __init__(
-        self, excitation: Excitation, ladder: Sequence[Rung], fewest: int, *, unit: float | None = None
+        self,
+        excitation: Excitation,
+        ladder: Sequence[Rung],
+        fewest: int,
+        *,
+        unit: float | None = None,
+        most: int = sys.maxsize,
     ) -> None:
         super().__init__(excitation.inputs, excitation.outputs, states=0)  # set below, once they are found
         self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
+        self._fewest, self._most = fewest, most
         self._known: dict[int, tuple[Floats, Floats]] = {}
         self.accuracy = 0.0
         self._find_coordinates(excitation.errors_over(ladder), fewest)
@@ -127,6 +136,12 @@ class Tangent(LinearSimulator):
         except UsageError:
             return None
         return again if again.accuracy <= max(LINEAR, SIMILAR * self.precision) else None
+
+    def with_pulse(self, factor: float) -> "Tangent":
+        """The same with pulses times a factor, at no more states: what rounding adds to them is none."""
+        excitation = copy(self._excitation)
+        excitation.pulse *= factor
+        return Tangent(excitation, self.ladder, self._fewest, unit=self.unit, most=len(self.state))
 
     def prove(self, h: float, duration: float) -> None:
         """Compare its response to a random input, in steps of `h` over a `duration` [s], with that of the component.
@@ -204,7 +219,7 @@ class Tangent(LinearSimulator):
             by_output = (errors * columns).reshape(-1, len(self.outputs), futures.shape[1])
             rows = np.tile(1.0 / np.sqrt(np.mean(by_output**2, axis=(0, 2))), len(by_output))[:, None]
         left, values, _ = np.linalg.svd(futures * rows * columns, full_matrices=False)
-        rank = int((values > STANDS_OUT * np.linalg.norm(errors * rows * columns, 2)).sum())
+        rank = min(int((values > STANDS_OUT * np.linalg.norm(errors * rows * columns, 2)).sum()), self._most)
         axes = left[:, :rank] * rows
         size = np.linalg.norm(axes, axis=0)
         chosen = _most_independent(axes.T @ (futures * columns), rank)

@@ -111,7 +111,7 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         return found
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
     slope = (growths[above] - growths[below]) / (above - below)
-    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE) - growths[below])
+    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE, known) - growths[below])
     precise = known_to(precision_of(one for _, _, one in known.values()))
     return replace(found, method=f"{LOOP}{precise}", accuracy=found.accuracy + difference / slope)
 

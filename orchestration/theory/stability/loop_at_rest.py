@@ -69,8 +69,6 @@ class AtRest:
     """A system at rest, and its components about it."""
 
     simulation: PreparedRun
-    factor: float
-    """Factor of the pulses that are chosen"""
     extra: ExtraSignals
     saved_states: Mapping[str, bytes]
     """Saved states of the components at rest"""
@@ -130,10 +128,10 @@ class AtRest:
         model, rest = self.simulation.instances[name].model, self.rest_of(name)
         component, period = self.simulation.system.components[name], float(self.period) / NANOSECONDS
         if component.sampling is not None:
-            return of_samples(rest, component.sampling.period, self.factor)
+            return of_samples(rest, component.sampling.period)
         step = component.step or period
         unit = None if model.varies_step else step
-        return self._kept(name, in_continuous_time(rest, period, step, self.factor, unit=unit))
+        return self._kept(name, in_continuous_time(rest, period, step, unit=unit))
 
     def rest_of(self, name: str) -> Rest:
         """A component at rest: the last inputs and time, and the variables that belong to the loop."""
@@ -156,7 +154,6 @@ class AtRest:
 def at_rest(
     system: System,
     instances: Instances,
-    factor: float = 1.0,
     extra: ExtraSignals = NO_SIGNALS,
     models: Mapping[str, Model] | None = None,
     known: KnownTangents | None = None,
@@ -168,7 +165,7 @@ def at_rest(
     rest there, or has no linear loop, saying why.
     """
     calm = deterministic(system)
-    with _settled(calm, _expect_period(calm), instances, factor, extra, models, {} if known is None else known) as loop:
+    with _settled(calm, _expect_period(calm), instances, extra, models, {} if known is None else known) as loop:
         yield loop
 
 
@@ -176,7 +173,6 @@ def at_rest(
 def whole_at_rest(
     system: System,
     instances: Instances,
-    factor: float = 1.0,
     models: Mapping[str, Model] | None = None,
     known: KnownTangents | None = None,
 ) -> Iterator[AtRest]:
@@ -187,13 +183,13 @@ def whole_at_rest(
     calm, known = deterministic(system), {} if known is None else known
     seen = {name: samples_of(one) for name, (_, _, one) in known.items() if name in calm.components}
     period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
-    with _settled(calm, period, instances, factor, NO_SIGNALS, models, known) as loop:
+    with _settled(calm, period, instances, NO_SIGNALS, models, known) as loop:
         sampled = [name for name, one in calm.components.items() if one.sampling is not None]
         whole = hyperperiod([period, *_cycles(calm, {name: loop.samples(name) for name in sampled})])
         if whole == period:
             yield loop
             return
-    with _settled(calm, whole, instances, factor, NO_SIGNALS, models, known) as loop:
+    with _settled(calm, whole, instances, NO_SIGNALS, models, known) as loop:
         yield loop
 
 
@@ -202,7 +198,6 @@ def _settled(
     calm: System,
     period: Fraction,
     instances: Instances,
-    factor: float,
     extra: ExtraSignals,
     models: Mapping[str, Model] | None,
     known: KnownTangents,
@@ -217,7 +212,7 @@ def _settled(
         _settle(simulation, begin, period)
         yield AtRest(
             simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
-            factor=factor, extra=extra, period=period, known=known,
+            extra=extra, period=period, known=known,
         )  # fmt: skip
 
 

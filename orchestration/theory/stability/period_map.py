@@ -74,10 +74,12 @@ def growth_of_loop(
 ) -> float:
     """The growth rate [1/s] of small deviations from the operating point of `system`; negative: they decay.
 
-    Tangents are kept in `known`, as by `at_rest`. Raises `UsageError` where the system does not rest there, or has no
-    linear loop, saying why.
+    Tangents are kept in `known`, as by `at_rest`; the pulses that measure them are multiplied by `factor`. Raises
+    `UsageError` where the system does not rest there, or has no linear loop, saying why.
     """
-    with whole_at_rest(system, instances, factor, known=known) as loop:
+    with whole_at_rest(system, instances, known=known) as loop:
+        if factor != 1.0:
+            loop = replace(loop, begun={name: one.with_pulse(factor) for name, one in loop.tangents.items()})
         radius = float(np.abs(np.linalg.eigvals(period_map(loop))).max(initial=0.0))
         return math.log(radius) / (float(loop.period) / NANOSECONDS) if radius > 0.0 else -math.inf
 

@@ -51,7 +51,7 @@ def rest(fmu: Any) -> Rest:
 
 
 def tangent(fmu: Any) -> Tangent:
-    return of_one_rate(of_samples(rest(fmu), 1.0, 1.0).tangent())
+    return of_one_rate(of_samples(rest(fmu), 1.0).tangent())
 
 
 def responses(simulator: Any, samples: int) -> list[float]:
@@ -129,7 +129,7 @@ def test_a_component_of_several_rates_is_pulsed_at_one_sample_to_choose_and_what
 
     monkeypatch.setattr(Excitation, "choose_pulse", noted)
     fmu = Alternating(3)
-    begun = of_samples(rest(fmu), 1.0, 1.0)
+    begun = of_samples(rest(fmu), 1.0)
     assert begun.samples == 4
     before = fmu.steps
     measured = begun.tangent()
@@ -152,7 +152,7 @@ class Cascaded(Alternating):
 def test_pulses_of_a_component_of_several_rates_are_chosen_for_all_of_its_tasks() -> None:
     fmu = Cascaded(3)
     fmu.kept += 0.5
-    found = of_samples(rest(fmu), 1.0, 1.0).tangent()
+    found = of_samples(rest(fmu), 1.0).tangent()
     assert responses(found, 6) == pytest.approx([0.0, 0.0, 0.012 * 0.81, 0.0, 0.0, 0.0], abs=1e-9)
 
 
@@ -223,6 +223,10 @@ def test_a_component_in_single_precision_is_measured_by_large_pulses() -> None:
     assert responses(measured, 4) == pytest.approx([0.9 * x for x in responses(Line(3), 4)], abs=1e-5)
     assert 0.0 < measured.precision < 1e-4
     assert tangent(Line(3)).precision == 0.0
+    smaller = measured.with_pulse(0.25)
+    assert (smaller.pulse, len(smaller.state)) == (0.25 * measured.pulse, 2)
+    assert responses(smaller, 4) == pytest.approx(responses(measured, 4), abs=1e-4)
+    assert len(Tangent(Excitation(rest(Line(3))), [Rung(1, 1.0)] * 8, 6, most=2).state) == 2  # of three
 
 
 class Quantising(Line):
