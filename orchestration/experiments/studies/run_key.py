@@ -152,11 +152,22 @@ def _shared_of(part: str, shared: Mapping[str, Any], hashes: Mapping[str, str]) 
 
 def _values_of(of: Any) -> dict[str, Any]:
     values = {field.name: getattr(of, field.name) for field in dataclasses.fields(of)}
-    return {name: value for name, value in values.items() if name not in _LATER or value not in (None, ())}
+    return {name: value for name, value in values.items() if name not in _LATER or value not in _UNSET}
 
 
-_LATER = ("interface", "partition", "instance", "solver", "fmu_clock", "start_time", "outside", "points")
+_LATER = (
+    "interface",
+    "partition",
+    "instance",
+    "solver",
+    "fmu_clock",
+    "start_time",
+    "outside",
+    "points",
+    "within_steps",
+)
 """Keys without which studies were stored before there were any, as they are still if these are not set"""
+_UNSET = (None, (), False)
 
 
 def _content(of: Any, hashes: Mapping[str, str]) -> dict[str, Any]:

@@ -25,9 +25,11 @@ from hypothesis import strategies as st
 
 from orchestration.components.building import fmus
 from orchestration.experiments.studies import store as stores
-from orchestration.experiments.studies.run_key import run_key
+from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.run_key import run_key, study_parts
 from orchestration.experiments.studies.store import open_for_reading, open_for_writing
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
+from orchestration.experiments.studies.study import Study
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.translation import ReferenceChoice
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_PLANT
@@ -492,6 +494,13 @@ def test_the_key_differs_with_everything_that_determines_a_run(tmp_path: Path) -
     found = list(different_keys(tmp_path))
     assert len(found) == 30
     assert len(set(found)) == len(found)
+
+
+def test_keys_that_came_later_are_not_in_what_studies_without_them_were_stored_by() -> None:
+    parts = study_parts(Study(name="any", base=BASE, axes=(Axis(name="timing.period", values=(0.01,)),)))
+    keys = {name.removeprefix("reference.") for name in parts if name.startswith("reference.")}
+    assert keys == {"columns", "constant", "file", "interpolation", "name", "noise", "parameters", "period", "scale",
+                    "to", "trajectory"}  # fmt: skip
 
 
 def test_the_key_differs_with_a_distribution_and_the_content_of_a_trace_but_not_its_path(
