@@ -42,27 +42,8 @@ _LICENCES = {
 }
 _LICENCE_OF_THE_MODEL = "The licence of the model itself is named in modelDescription.xml.\n"
 
-_ENTRY = '''\
-"""Entry of {model}.fmu. pythonfmu runs this file once for each instance."""
-
-import sys
-
-if sys.version_info < {oldest}:
-    raise ImportError("{model}.fmu: expected Python {required}, found " + sys.version.split()[0])
-
-from {bundle}.fmu_kit.failure import restore_reference
-from {bundle}.{module} import {model} as Model
-
-restore_reference(globals())
-
-
-class {model}(Model):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-
-    def do_step(self, current_time, step_size):
-        return super().do_step(current_time, step_size)
-'''
+_ENTRY = Path(__file__).with_name("entry.tmpl")
+"""Template of the module that pythonfmu runs in an FMU."""
 
 
 def source_hash(target: Target) -> str:
@@ -76,6 +57,7 @@ def source_hash(target: Target) -> str:
         documentation.IN_PYTHON,
         Path(loader.__file__),
         loader.SOURCE,
+        _ENTRY,
     )
     return hash_of(target, own, {"compiler": str(loader.compiler() is not None)}, unchanged_files(target))
 
@@ -158,7 +140,8 @@ def write_fmu(files: dict[str, bytes], target: Target, folder: Path) -> Path:
 def _entry(bundle: str, target: Target) -> str:
     """The module that pythonfmu runs; its syntax is that of the oldest Python that could load it."""
     oldest = tuple(map(int, PYTHON_REQUIRED.removeprefix(">=").split(".")))
-    return _ENTRY.format(bundle=bundle, module=target.entry, model=target.name, oldest=oldest, required=PYTHON_REQUIRED)
+    entry = _ENTRY.read_text(encoding="utf-8")
+    return entry.format(bundle=bundle, module=target.entry, model=target.name, oldest=oldest, required=PYTHON_REQUIRED)
 
 
 def slave_class(target: Target) -> Any:

@@ -39,7 +39,7 @@ def test_figures_and_tables_name_every_metric_of_a_flight_in_words(flight: Resul
     for name, unit in flight.units.items():
         assert display_names.METRICS.get(name, ("", None))[1] == unit, (
             f'{name}: expected a line "{name}": ("WORDS", "{unit}") of METRICS in '
-            f"orchestration/simulation/results/display_names.py"
+            f"orchestration/simulation/results/display_names.toml"
         )
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fmu_kit.compiler.emit.c_names import c_string
+from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.variables import Causality, Variable
 
 CXX = (".cpp", ".cc", ".cxx")
@@ -106,32 +107,7 @@ class UserCode:
 
 
 # Names of the user's own variables must not be hidden by those of the functions here.
-_CXX = """\
-template <class T> struct quadcosim_kind {
-    static T of(double x) { return x > -9e18 && x < 9e18 ? (T)(long long)(x < 0.0 ? x - 0.5 : x + 0.5) : (T)0; }
-    static bool has(double x, double stored) { return stored - x >= -0.5 && stored - x <= 0.5; }
-};
-template <class T> struct quadcosim_real {
-    static T of(double x) { return (T)x; }
-    static bool has(double, double) { return true; }
-};
-template <> struct quadcosim_kind<float> : quadcosim_real<float> {};
-template <> struct quadcosim_kind<double> : quadcosim_real<double> {};
-template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
-template <class T> struct quadcosim_one { enum { is = 1 }; };
-template <class T> struct quadcosim_one<T *> { enum { is = 0 }; };
-template <class T, unsigned long N> struct quadcosim_one<T[N]> { enum { is = 0 }; };
-template <class T> struct quadcosim_one<T &> : quadcosim_one<T> {};
-extern "C" void quadcosim_init(void);
-extern "C" void quadcosim_after_parameters(void);
-extern "C" void quadcosim_step(void);
-extern "C" void quadcosim_run(unsigned);
-extern "C" unsigned quadcosim_set_inputs(const double *, unsigned);
-extern "C" unsigned quadcosim_set_parameters(const double *, unsigned);
-extern "C" void quadcosim_get_outputs(double *, unsigned);
-extern "C" void quadcosim_get_all(double *, unsigned);
-extern "C" void __cxa_pure_virtual(void) { __builtin_trap(); } /* the runtime library's would take more of it */
-"""
+_CXX = (FOLDER / "user_code.h").read_text(encoding="utf-8")
 
 
 def user_code(code: UserCode) -> str:

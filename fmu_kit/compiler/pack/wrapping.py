@@ -43,19 +43,6 @@ _LONGEST = 60.0
 """The most seconds that the code's initialisation may take"""
 _BESIDE = ("exchange.h", "instance.h", "integers.h", "lanes.h", "mathematics.h", "text.h", "wrapped.h")
 _OF_LANES = ("integers.h", "lanes.h", "mathematics.h", "places.h", "wrapped.h")
-_PROBE = """
-#include <stdio.h>
-void quadcosim_init(void);
-void quadcosim_get_all(double *values, unsigned apart);
-int main(void) {
-    double values[VARIABLES];
-    quadcosim_init();
-    quadcosim_get_all(values, 1);
-    for (unsigned i = 0; i < VARIABLES; i++)
-        printf("%a\\n", values[i]);
-    return 0;
-}
-"""
 _DECLARATIONS = {"input": Input, "output": Output, "parameter": FixedParameter}
 
 
@@ -84,7 +71,7 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
         user = folder / f"user_code{'.cpp' if code.is_cxx else '.c'}"
         (folder / user.name).write_text(user_code(code), encoding="utf-8")
         objects = build_objects(code, user, folder)
-        (folder / "probe.c").write_text(_PROBE, encoding="utf-8")
+        (folder / "probe.c").write_bytes((FOLDER / "wrapped_probe.c").read_bytes())
         for warning in objects.warnings:
             print(warning, file=sys.stderr)
         starts = _starts(code, objects, folder)

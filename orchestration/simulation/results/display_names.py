@@ -2,93 +2,25 @@
 
 import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
+from orchestration.foundation.basics.documents import read_toml
 from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.connection import component_of, variable_of
 
-METRICS: Mapping[str, tuple[str, str | None]] = {
-    "outcome": ("outcome", None),
-    "good": ("meets the criterion", None),
-    "horizon": ("time by which it is judged", "s"),
-    "position_rmse": ("RMS position error", "m"),
-    "position_iae": ("integral of the position error", "m.s"),
-    "position_itae": ("integral of time × position error", "m.s2"),
-    "position_max": ("largest position error", "m"),
-    "settling_time": ("settling time", "s"),
-    "ultimate_bound": ("largest position error, last third", "m"),
-    "attitude_error_rmse": ("RMS attitude error", "rad"),
-    "attitude_error_max": ("largest attitude error", "rad"),
-    "energy_growth_share": ("share of samples at which the energy grows", "1"),
-    "control_effort.thrust": ("control effort, thrust", "N2.s"),
-    "control_effort.torque": ("control effort, torque", "N2.m2.s"),
-    "torque_max": ("largest torque", "N.m"),
-    "total_variation.thrust": ("total variation of thrust", "N"),
-    "total_variation.torque": ("total variation of torque", "N.m"),
-    "saturation_share": ("share of time at a limit of the plant", "1"),
-    "diverged": ("diverged", None),
-    "divergence_time": ("time of divergence", "s"),
-    "steps": ("steps of the plant", None),
-    "wall_time": ("time that the run took", "s"),
-    "engine": ("engine", None),
-}
-"""Metrics of a run of the quadrotor: name and unit; docs/metrics.md defines each."""
+_TABLES = read_toml(Path(__file__).with_suffix(".toml"), "file of display names")
 
-SETTINGS: Mapping[str, tuple[str, str | None]] = {
-    "stop_time": ("stop time", "s"),
-    "seed": ("seed", None),
-    "vehicle": ("vehicle", None),
-    "controller": ("controller", None),
-    "controller.fmu": ("controller", None),
-    "plant.fmu": ("plant", None),
-    "reference.file": ("reference", None),
-    "timing.period": ("period", "s"),
-    "timing.offset": ("offset of the first sample", "s"),
-    "timing.plant_interval": ("plant interval", "s"),
-    "timing.order": ("order of exchange", None),
-    "timing.hold": ("hold", None),
-    "timing.clock": ("clock", None),
-    "timing.delay": ("delay", "s"),
-    "timing.delay_jitter": ("jitter of the delay", "s"),
-    "timing.jitter": ("jitter of the sampling", "s"),
-    "timing.jitter_distribution": ("distribution of the jitter", None),
-    "timing.noise.position": ("position noise", "m"),
-    "timing.noise.velocity": ("velocity noise", "m/s"),
-    "timing.noise.angular_velocity": ("angular velocity noise", "rad/s"),
-    "timing.measurement_loss": ("loss of measurements", None),
-    "timing.command_loss": ("loss of commands", None),
-    "timing.clock_ratio": ("clock ratio", None),
-    "controller.coupling": ("κ", "kg"),
-    "controller.surface_exponent": ("exponent of the surface β_t", None),
-    "controller.gain.surface": ("surface gain k_s", None),
-    "controller.gain.eta": ("gain k_η", "rad/s"),
-    "controller.gain.theta": ("gain k_θ", "N.m.s"),
-    "controller.gain.attitude": ("gain k_q", "N.m"),
-    "controller.gain.disturbance": ("gain β", "m/s2"),
-    "controller.discretisation": ("redesign", None),
-    "plant.mass": ("mass", "kg"),
-    "plant.thrust_max": ("largest thrust", "N"),
-    "plant.torque_max": ("largest torque", "N.m"),
-}
-"""Settings of a scenario, by path: name and unit; others are named by the words of their path."""
 
-SIGNALS: Mapping[str, str] = {
-    "plant.thrust": "thrust",
-    "plant.position": "position",
-    "plant.velocity": "velocity",
-    "plant.quaternion": "attitude quaternion",
-    "plant.angular_velocity": "angular velocity",
-    "plant.torque": "torque",
-    "plant.tilt": "tilt",
-    "reference.position": "desired position",
-    "controller.position_error": "position error",
-    "controller.velocity_error": "velocity error",
-    "controller.attitude_error": "attitude error",
-    "controller.angular_velocity_error": "angular velocity error",
-    "controller.sliding": "sliding variable",
-    "controller.energy": "energy L",
-}
-"""Signals of the quadrotor's loop; vectors by their stem, to which the axis is appended."""
+def _with_units(table: str) -> Mapping[str, tuple[str, str | None]]:
+    return {key: (name, unit[0] if unit else None) for key, (name, *unit) in _TABLES[table].items()}
 
+
+METRICS = _with_units("metrics")
+"""Metrics of a run of the quadrotor: name and unit."""
+SETTINGS = _with_units("settings")
+"""Settings of a scenario, by path: name and unit."""
+SIGNALS: Mapping[str, str] = _TABLES["signals"]
+"""Signals of the quadrotor's loop, vectors by their stem."""
 AXES: Mapping[str, str] = {"x": "x", "y": "y", "z": "z", "w": "w"}
 
 
