@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
-from orchestration.foundation.basics.terminal import warn
+from orchestration.foundation.basics.terminal import in_columns, warn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,8 +59,7 @@ def _lines(expected: "Expected") -> list[str]:
         "accuracy": f"{expected.accuracy:.1g} of each",
         "method": expected.method,
     }
-    width = max(map(len, texts))
-    lines = [f"{name:<{width}}  {value}" for name, value in texts.items()]
+    lines = [*in_columns([*texts.items()])]
     if fourth is not None and expected.mean_square_radius < 1.0 <= fourth:
         lines.append("fourth moments are infinite: confidence intervals of mean squares over runs are meaningless here")
     names_by_reason: dict[str, list[str]] = {}

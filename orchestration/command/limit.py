@@ -81,8 +81,7 @@ def limit(
         for written in draw_limit(request, found, where, look.figure_style):
             inform(str(written))
     texts = limits.as_text(found)
-    width = max(map(len, texts))
-    lines = [f"{name:<{width}}  {value}" for name, value in texts.items()]
+    lines = [*in_columns([*texts.items()])]
     if shares := limits.shares_as_text(found):
         lines += ["", *in_columns(shares)]
     return CommandResult(document=found, verdict=found.verdict, lines=lines)

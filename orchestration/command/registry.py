@@ -198,7 +198,11 @@ _LEFT = object()
 
 
 class TakesPlainValues:
-    """A command of the parser, or a group of commands, that takes such values of its parameters as they are."""
+    """A command of the parser, or a group of commands, that converts plain values itself, as that would load Pydantic.
+
+    Only what the parser would accept, with the same result: values that are not given, texts, decimal numbers, and
+    paths. All else is left to it, with its messages.
+    """
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, as the parser asks for them."""

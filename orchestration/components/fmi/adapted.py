@@ -11,9 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_kit.bundle import PackagingError
-from fmu_kit.compiler.pack.c_compiler import OPTIONS, compiled_here
-from fmu_kit.libraries import cached_library
 from orchestration.components.fmi.access import SCHEDULED, USUAL, Access, Interface
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance, StepsWithEnd
@@ -21,8 +18,14 @@ from orchestration.components.fmi.instance import start_number
 from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.components.fmi.transfers import Numbers
-from orchestration.foundation.basics.c_structures import address, constants, declared, expect_same_sizes
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.foundation.basics.c_structures import (
+    address,
+    compiled_library,
+    constants,
+    declared,
+    expect_same_sizes,
+)
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 
@@ -63,11 +66,7 @@ _PROBLEMS = {
 def library() -> Any:
     """The functions of adapter.c; raises `QuadcosimError` with the reason if they are not available."""
     sources = {SOURCE.name: SOURCE.read_bytes()}
-    try:
-        path = cached_library("adapter", sources, OPTIONS, lambda: compiled_here(sources, SOURCE.name))
-        loaded = ctypes.CDLL(str(path))
-    except (PackagingError, OSError) as error:
-        raise QuadcosimError(str(error)) from error
+    loaded = compiled_library("adapter", sources)
     expect_same_sizes(loaded, _types())
     pointer, number = ctypes.c_void_p, ctypes.c_double
     loaded.step.argtypes = (pointer, number, number, ctypes.c_bool, pointer, pointer, pointer, pointer)

@@ -1,4 +1,7 @@
-"""How a tool steps the FMUs, from the logs of traced copies, which record their inputs and steps."""
+"""How a tool steps the FMUs, from the logs of traced copies, which record their inputs and steps.
+
+A copy has a library in front of the FMU's own, which forwards every call: `recorder.c`.
+"""
 
 import functools
 import json

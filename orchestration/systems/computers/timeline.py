@@ -1,4 +1,7 @@
-"""The timeline of tasks and messages: their jobs and frames, and the use of processors and networks."""
+"""The timeline of tasks and messages: their jobs and frames, and the use of processors and networks.
+
+Times are in nanoseconds; NEVER stands for what did not happen before the end.
+"""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,8 @@
 """Motions by name: positions over time, with their derivatives up to snap.
 
 Inertial frame north-east-down (z points down), SI units. Each begins at (x, y, z); periodic ones begin towards north,
-and accelerate from rest over `ramp` seconds, with four continuous derivatives.
+and accelerate from rest over `ramp` seconds, with four continuous derivatives. The functions of time
+of which they consist use `ScalarOps`, so that times are floats, arrays of them or symbols.
 """
 
 import math
