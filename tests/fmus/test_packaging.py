@@ -89,11 +89,15 @@ def test_a_copied_source_tree_gives_the_same_bytes(built: dict[str, Path], sourc
         assert (tmp_path / f"{model}.fmu").read_bytes() == built[model].read_bytes(), model
 
 
-def test_the_copied_tree_is_what_is_built(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
+def test_the_copied_tree_is_what_is_built_and_of_other_sources_it_is_out_of_date(
+    built: dict[str, Path], sources: Path, tmp_path: Path
+) -> None:
+    shutil.copy(built["QuadrotorPlant"], tmp_path)
     replace(sources / "controller_fmu" / "sliding_mode" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
     fmu = build(sources, tmp_path, "UnifiedController")
     assert fmu.read_bytes() != built["UnifiedController"].read_bytes()
     assert any(b"2.0 * model.mass * n" in content for content in files_of(fmu).values())
+    assert builder.out_of_date(["UnifiedController", "QuadrotorPlant"], tmp_path) == ["UnifiedController"]
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -101,21 +105,15 @@ def test_without_a_source_date_the_date_is_1980(model: str, built: dict[str, Pat
     assert fmpy.read_model_description(str(built[model])).generationDateAndTime == "1980-01-01T00:00:00Z"
 
 
-def test_source_date_epoch_sets_the_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", str(EPOCH))
-    (path,) = builder.build(["QuadrotorPlant"], tmp_path)
-    date = fmpy.read_model_description(str(path)).generationDateAndTime
-    expected = datetime.datetime.fromtimestamp(EPOCH, datetime.timezone.utc)
-    assert date == expected.strftime("%Y-%m-%dT%H:%M:%SZ") == "2001-09-09T01:46:40Z"
-
-
-def test_source_date_epoch_does_not_change_the_guid(
+def test_source_date_epoch_sets_the_date_and_does_not_change_the_guid(
     built: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", str(EPOCH))
     (path,) = builder.build(["QuadrotorPlant"], tmp_path)
-    plain = fmpy.read_model_description(str(built["QuadrotorPlant"]))
-    assert fmpy.read_model_description(str(path)).guid == plain.guid
+    dated, plain = (fmpy.read_model_description(str(each)) for each in (path, built["QuadrotorPlant"]))
+    expected = datetime.datetime.fromtimestamp(EPOCH, datetime.timezone.utc)
+    assert dated.generationDateAndTime == expected.strftime("%Y-%m-%dT%H:%M:%SZ") == "2001-09-09T01:46:40Z"
+    assert dated.guid == plain.guid
 
 
 # -- content --------------------------------------------------------------------------------------------
@@ -351,13 +349,6 @@ def test_the_source_hash_changes_with_the_files_beside_the_slave(
 
 def test_fresh_fmus_are_up_to_date(built: dict[str, Path]) -> None:
     assert builder.out_of_date(MODELS, built["QuadrotorPlant"].parent) == []
-
-
-def test_an_fmu_of_other_sources_is_out_of_date(built: dict[str, Path], sources: Path, tmp_path: Path) -> None:
-    shutil.copy(built["QuadrotorPlant"], tmp_path)
-    replace(sources / "controller_fmu" / "sliding_mode" / "law.py", "model.mass * n  #", "2.0 * model.mass * n  #")
-    build(sources, tmp_path, "UnifiedController")
-    assert builder.out_of_date(["UnifiedController", "QuadrotorPlant"], tmp_path) == ["UnifiedController"]
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no archive"])

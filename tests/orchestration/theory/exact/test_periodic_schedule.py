@@ -179,9 +179,9 @@ def test_with_less_to_do_all_three_die_out_as_they_do_in_a_run() -> None:
     )  # fmt: skip
     for scheduling in ("fixed-priority", "earliest-deadline-first"):
         system = changed(servos, {"computers.node.scheduling": scheduling})
-        found = expect(system, as_simulated=True, horizon=0.2)
+        found = expect(system, as_simulated=True, horizon=0.1)
         assert found.mean_square_radius < 1.0
-        printed = run(replace(system, stop_time=0.2)).metrics
+        printed = run(replace(system, stop_time=0.1)).metrics
         assert found.objectives == pytest.approx({name: printed[name] for name in servos.objectives}, rel=1e-9)
 
 
