@@ -135,4 +135,4 @@ newcomer: .venv/.test
 	touch $@
 
 clean:
-	rm -rf .venv .venv-cofmupy results site build dist fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native
+	rm -rf .cache/built_for_tests .venv .venv-cofmupy results site build dist fmus/*.fmu fmus/native fmus/*.ssp examples/*/*.fmu examples/*/native
