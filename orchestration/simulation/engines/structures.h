@@ -207,7 +207,7 @@ typedef struct {
     int64_t stays; /* whether all held values stay unchanged at an instant with nothing but a step */
     int64_t seen_count, given_count;
     double *seen, *given, *state, *constants, *numbers;
-    Lanes doubtful; /* in which a value was not a number */
+    Lanes doubtful; /* in which a value was not a number, or one of a component between its points */
     Kept *kept;
     int32_t *status;
     int64_t recorded_count, record_limit; /* number of recorded columns, and largest number of rows: 0 for none */

@@ -12,6 +12,7 @@ from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.basics.unit_algebra import after
 from orchestration.foundation.recording.recording import Chunk, Events, InMemory, Recording
+from orchestration.simulation.results.own_points import Points, cut_at_points, on_lines, rows_at_points
 from orchestration.systems.expressions.over_run import Recorded, Spans, evaluate, expect_names, expect_number, vectors
 from orchestration.systems.expressions.syntax import Name, Node, Number, Operation, names, parse
 from orchestration.systems.system.model import DIVERGED, TERMINATED, System, expressions
@@ -123,16 +124,24 @@ def columns_used(system: System, columns: Sequence[str]) -> tuple[str, ...]:
     return tuple(c for c in columns if c == "time" or c in named or c.rpartition(".")[0] in named)
 
 
-def spans(system: System, recording: Recording, parameters: Mapping[str, float], end: float) -> Iterator[Recorded]:
+def spans(
+    system: System, recording: Recording, parameters: Mapping[str, float], end: float, points: Points | None
+) -> Iterator[Recorded]:
     """The data that expressions of a run up to `end` [s] use, chunk by chunk, each with the last row of the one before.
 
-    Their `stop_time` is the end, so that the last third of an interrupted run is that of its recording.
+    `points` are those of its components in continuous time; None: all have one at every row. The `stop_time` is the
+    end, so that the last third of an interrupted run is that of its recording.
     """
     columns = columns_used(system, recording.columns)
     lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
     before: Floats | None = None
-    for chunk in recording.chunks(columns):
+    chunks = recording.chunks(columns)
+    for chunk in chunks if points is None else cut_at_points(system, chunks, points):
         rows = chunk.rows if before is None else np.vstack([before, chunk.rows])
+        goes_on = before is not None
+        known = {} if points is None else rows_at_points(system, chunk.columns, rows, points)
+        before = rows[-1:]
+        rows = on_lines(chunk.columns, rows, known) if known else rows
         signals = {name: rows[:, i] for i, name in enumerate(chunk.columns)}
         arrivals = _arrivals(system, signals["time"], chunk.events)
         yield Recorded(
@@ -142,9 +151,9 @@ def spans(system: System, recording: Recording, parameters: Mapping[str, float],
             numbers=parameters,
             arrivals=arrivals,
             stop_time=end,
-            goes_on=before is not None,
+            goes_on=goes_on,
+            known=known,
         )
-        before = rows[-1:]
 
 
 def not_finite(spans: Spans) -> str | None:

@@ -7,10 +7,18 @@ from typing import Any
 
 from orchestration.foundation.basics.errors import Named, SimulatorError
 from orchestration.foundation.basics.interrupt import Interrupted
+from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.passable import passable
 from orchestration.foundation.recording.recording import Recorder
-from orchestration.simulation.engines.resolved import ResolvedRequest, idle_partitions, periods_in_words, uneven_steps
+from orchestration.simulation.engines.resolved import (
+    ResolvedRequest,
+    fixed_steps,
+    idle_partitions,
+    periods_in_words,
+    uneven_steps,
+)
 from orchestration.simulation.results import objectives
+from orchestration.simulation.results.own_points import points_of
 from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.expressions.over_run import Recorded
@@ -63,8 +71,10 @@ def result_of(
     recording = recorder.finish()
     numbers = {**resolved.parameters, **resolved.of_jobs}
 
+    points = points_of(resolved.system, fixed_steps(resolved.system, resolved.models), nanoseconds(outcome.end))
+
     def spans() -> Iterator[Recorded]:
-        return objectives.spans(resolved.system, recording, numbers, outcome.end)
+        return objectives.spans(resolved.system, recording, numbers, outcome.end, points)
 
     metrics = objectives.compute(
         resolved.system,

@@ -46,6 +46,8 @@ class Recorded:
     """constants of the run, such as parameters, by name"""
     arrivals: Mapping[str, Booleans] = field(default_factory=dict)
     """Rows at which a message arrived, by connection, shape (n,)"""
+    known: Mapping[str, Booleans] = field(default_factory=dict)
+    """Rows at which signals of a component between its points are known, shape (n,); on a line at the others"""
     stop_time: float
     """Time at which the run ended [s]"""
     goes_on: bool = False
@@ -164,7 +166,18 @@ class SpanValues:
         def middles() -> Floats | None:
             return self._at(node, "middles") if all(map(self._is_held, names(node))) else None
 
+        if not any(map(self._is_partly_held, names(node))) and (at := self._known_rows(node)) is not None:
+            at[0] = True  # the last row of the span before
+            there = values[at]
+            return Course(recorded.time[at], there, lambda: there[1:], lambda: None, sampled=False, first=first)
         return Course(recorded.time, values, ends, middles, sampled=False, first=first)
+
+    def _known_rows(self, node: Node) -> Booleans | None:
+        """The rows at which signals of an expression are known, and not all on lines; None: all rows."""
+        recorded = self._recorded
+        parts = (part for name in names(node) for part in recorded.vectors.get(name, (name,)))
+        marks = [recorded.known[part] for part in parts if part in recorded.known]
+        return np.any(marks, axis=0) if marks else None
 
     def _is_partly_held(self, name: str) -> bool:
         """Whether it is another just before a row than at that row."""

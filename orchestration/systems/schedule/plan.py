@@ -12,7 +12,7 @@ from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Grid, seconds
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.computers import require_less
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, component_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.frames import ERROR_BITS, frame_nanoseconds
 from orchestration.systems.system.model import System
@@ -93,6 +93,30 @@ class Plan:
         )
         return ranked(members, (self._pair(i) for i in at_once if self._follows(i)))
 
+    @cached_property
+    def always_together(self) -> bool:
+        """Whether all components in continuous time have a point at every instant, whatever the times.
+
+        So it is with one that every sampled component reads, and that alone gets messages which may be late.
+        """
+        if not self.continuous:
+            return True
+        only, of = self.continuous[0], self._connections
+        now_read = {of[i].receiver for i in self.measured if i not in self.read_ahead and of[i].sender == only}
+        late = {
+            x.receiver
+            for i, x in enumerate(of)
+            if i not in self.measured and (x.delay or x.delay_jitter or x.order == "jacobi" or i in self.over_networks)
+        }
+        changed = [set(map(component_of, x.to)) for x in self.system.sources.values() if x.period is not None]
+        return (
+            len(self.continuous) == 1
+            and not self.system.uses_scheduler
+            and now_read == set(self.sampled)
+            and late <= {only}
+            and all(only in names for names in changed)
+        )
+
     def _follows(self, index: int) -> bool:
         return self._connections[index].order == "gauss-seidel"
 
@@ -108,6 +132,15 @@ class Plan:
 
     def _between_continuous(self, x: Connection) -> bool:
         return self._continuous(x.sender) and self._continuous(x.receiver)
+
+
+def own_outputs(system: System, signals: Iterable[str]) -> list[str]:
+    """Those of `signals` that components in continuous time give at their own points, not what is set in them."""
+    continuous = {name for name, component in system.components.items() if component.sampling is None}
+    held = {
+        end for each in (*(x.end for x in system.connections), *(x.to for x in system.sources.values())) for end in each
+    }
+    return [name for name in signals if component_of(name) in continuous and name not in held]
 
 
 def is_plain(x: Connection) -> bool:

@@ -132,7 +132,7 @@ class Engine {
     }
     if (outcome === OUTCOMES.notFinite) throw new Refused(`a value is no longer a number at ${time} s`);
     const diverged = outcome === OUTCOMES.diverged;
-    if (!diverged && c.doubtful_lanes() >> lane & 1) throw new Refused("a value of an objective is not a number");
+    if (!diverged && c.doubtful_lanes() >> lane & 1) throw new Refused("an objective has a value that is no number, or one of a component between its points: run computes it");
     const values = this.numbers(c.values_of_objectives(), this.lanes * this.system.objectives.length);
     const at = i => { const x = values[i * this.lanes + lane]; return Number.isFinite(x) && !diverged ? x : null; };
     const good = this.system.good < 0 ? null : !diverged && Boolean(at(this.system.good));

@@ -223,6 +223,8 @@ static void advance(Loop *l, Track *track) {
     for (int64_t i = 0; i < count; i++)
         if ((is_regular && regular->stepped[regular->at * count + i]) || (is_own && own->stepped[own->at * count + i]))
             track->moving[moving++] = l->continuous.items[i];
+        else if (time && is_observed(l->continuous.items[i]))
+            l->doubtful |= track->lanes; /* on a line to its next point, which is not known yet */
     track->source_row = is_regular ? regular->at : ~own->at;
     regular->at += is_regular, own->at += is_own;
 #define THOSE_OF(table, time_of_row) \

@@ -43,7 +43,7 @@ class BatchResult:
     component: Integers
     steps: Integers
     doubtful: Booleans
-    """Whether a value was not a number: such a run is repeated by another engine"""
+    """Whether a value was not a number, or one of a component between its points: another engine repeats such a run"""
     reductions: Mapping[Call, Floats]
     """NaN where there is no value"""
     signals: Sequence[Floats]

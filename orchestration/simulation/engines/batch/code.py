@@ -1,6 +1,6 @@
 """The C of a system's expressions: expressions.h, which batch.c includes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestration.simulation.engines.batch.folds import Folds
@@ -30,11 +30,13 @@ def expression_code(
     condition: Node | None,
     *,
     connections: Sequence[str],
+    observed: Collection[int],
 ) -> ExpressionCode:
     """The C for reductions and the condition of divergence over `leaves`.
 
     `lines` are the connections of signals that are extrapolated linearly, by signal; `reductions` the C of those inside
-    others. Raises `UsageError` for expressions that cannot be evaluated.
+    others; `observed` the components in continuous time that the reductions read. Raises `UsageError` for expressions
+    that cannot be evaluated.
     """
     writer = ExpressionWriter(leaves, reductions)
     time = writer.before(Name(TIME))
@@ -64,8 +66,10 @@ def expression_code(
             "q_mask doubtful = q_known(0);", *unused]  # fmt: skip
     done = [*writer.remembered(writer.now), "if (q_any(doubtful)) b->doubtful |= lanes_of(doubtful);", "return 1;"]
     step = [f"const q_real dt = q_select(m, t - {time}, q_all(0.0));"]
+    any_observed = " || ".join(f"index == {i}" for i in sorted(observed)) or "0 * index"
     return ExpressionCode(
         text="\n".join([
+            *_function("int is_observed(int64_t index)", [f"return {any_observed};"]),
             *_function("void constants(Loop *b)", [*writer.once.lines, *constants]),
             *_function("q_mask holds(const Loop *b, q_real t)", [*known, *unused, *watched.lines, f"return {over};"]),
             *_row("begin_row", [

@@ -1,7 +1,7 @@
 """What the runs of one batch have in common: their components, connections and expressions."""
 
 import re
-from collections.abc import Hashable, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,7 +24,7 @@ from orchestration.simulation.results.objectives import GOOD
 from orchestration.systems.expressions.at_instant import scalars
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined, reductions, vectors
 from orchestration.systems.expressions.syntax import Call, Node, names, names_job_measure, parse
-from orchestration.systems.schedule.plan import is_plain
+from orchestration.systems.schedule.plan import is_plain, own_outputs
 from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.computers import Network
 from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
@@ -262,6 +262,7 @@ class Shape:
             list(self.calls.values()),
             condition,
             connections=[x.name for x in self.system.connections],
+            observed={self.names.index(component_of(name)) for name in own_outputs(self.system, self._reduced)},
         )
 
     @cached_property
@@ -280,6 +281,11 @@ class Shape:
     def _expression_names(self) -> set[str]:
         nodes = [*self.nodes.values(), *([] if self.condition is None else [self.condition])]
         return {name for node in nodes for name in names(node)}
+
+    @property
+    def _reduced(self) -> Iterator[str]:
+        """The signals that reductions read."""
+        return (name for call in self.calls.values() for name in names(call) if name in self._signals)
 
     def _is_parameter(self, name: str) -> bool:
         model = self.models.get(component_of(name))

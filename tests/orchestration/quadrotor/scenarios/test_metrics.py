@@ -83,7 +83,7 @@ def measured(
     recording = recorded(signals, sorted(events), cuts)
     return objectives.compute(
         system,
-        lambda: objectives.spans(system, recording, limits, end),
+        lambda: objectives.spans(system, recording, limits, end, None),
         end=end,
         divergence_time=divergence_time,
         steps=0,

@@ -13,8 +13,8 @@ from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.systems.schedule import schedule_cache
-from orchestration.systems.system.component import Component
-from orchestration.systems.system.connection import Source
+from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.files import located as with_files
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
@@ -59,6 +59,27 @@ def test_a_run_with_a_component_that_fails_or_becomes_infinite_is_left_to_be_run
     alone = ran(crowd[3], "compiled", load=kept.load)
     assert found[3] is not None
     assert found[3].metrics == alone.metrics
+
+
+def test_a_row_between_the_points_of_a_component_has_it_on_a_line_and_such_runs_are_left_to_be_run_alone(
+    fmu: Path, kept: Kept
+) -> None:
+    listener = Component(fmu="stub", sampling=Sampling(period=0.1))
+    read, heard = LOOP.connections[0], Connection(name="heard", start=("controller.z",), end=("listener.u0z",))
+    told = replace(
+        of(replace(LOOP, components={**LOOP.components, "listener": listener}), fmu),
+        connections=(replace(read, noise={}, loss=0.0), *LOOP.connections[1:], heard),
+        objectives={"rms": "rms(plant.y)", "variation": "total_variation(plant.z - plant.y)",
+                    "product": "integral(plant.y * controller.y)"},
+    )  # fmt: skip
+    told = changed(told, {"components.controller.sampling.jitter": 0.0, "connections.heard.delay": 0.0})
+    late = changed(told, {"connections.heard.delay": 0.0037})
+    usual, between = (ran(each, "compiled", load=kept.load) for each in (told, late))
+    assert len(between.rows) > len(usual.rows)
+    for name in ("rms", "variation"):
+        assert between.metrics[name] == usual.metrics[name]
+    assert between.metrics["product"] == pytest.approx(usual.metrics["product"], rel=1e-12)
+    assert [each is None for each in Batches().run([told, late])] == [False, True]
 
 
 def test_a_run_in_lanes_draws_its_samples_once_and_what_is_regular_is_found_once_for_all(
