@@ -32,8 +32,13 @@ NONLINEAR = 1e-9
 LEAST = 3.0
 """Factor of the least difference that any size has, up to which it is linear, too"""
 ROUNDING = float(np.finfo(float).eps)
+SINGLE = float(np.finfo(np.float32).eps)
 COARSE = 1e-5
 """Difference of responses to small pulses, relative, from which an instance is taken to round coarsely"""
+COARSER = 1e-11
+"""Difference of the outputs then, which double precision rounds by less"""
+STANDS_OUT = 10.0
+"""Factor on errors: what is larger is none"""
 DITHER = (1.0, 1.137, 1.291, 1.443)
 """Factors of the pulses that show it: rounded alike at two sizes, responses may agree by chance"""
 SIZES = np.linspace(0.3, 1.0, 6)
@@ -41,11 +46,11 @@ SIZES = np.linspace(0.3, 1.0, 6)
 LINEAR_PART = np.linalg.pinv(np.stack([SIZES, SIZES**3], axis=1))[0]
 """Weights of the responses to them: the linear part of odd cubic functions that are fitted to them"""
 LARGE_PULSE = 0.01
-LARGE_FACTORS = np.geomspace(0.03, 30.0, 7)
+LARGE_FACTORS = np.geomspace(0.03, 30.0, 13)
 """Factors of the large pulse of each input that are tried"""
 FOLLOWS = 0.05
 """Share of the largest response of an output, from which it follows an input"""
-LARGER = (1e-3, 1e-2, 1e-1)
+LARGER = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 """Pulses of an input that none of the outputs follows, by which it is seen whether they follow larger ones"""
 ALIKE = 0.1
 """Difference of a step to two of half its length, relative to the largest response, up to which it is used instead"""
@@ -262,16 +267,27 @@ class Excitation:
     # -- coarse rounding -------------------------------------------------------------------------------------------
 
     def rounds_coarsely(self, rungs: Sequence[Rung]) -> bool:
-        """Whether responses to the chosen pulses differ by their sizes, more than a linear model may."""
+        """Whether responses to the chosen pulses differ by their sizes, more than a linear model may.
+
+        Or those to smaller ones, which are better if not for rounding.
+        """
+        chosen = self.pulse
+        try:
+            return self._differs(rungs, 0.0) or (chosen > PULSE and self._differs(rungs, COARSER, PULSE))
+        finally:
+            self.pulse = chosen
+
+    def _differs(self, rungs: Sequence[Rung], least: float, pulse: float | None = None) -> bool:
+        self.pulse = pulse or self.pulse
         for i in range(len(self.inputs)):
             found = [self.response(i, rungs, factor=factor) for factor in DITHER]
             each = np.array([course[: min(map(len, found))] for course in found])
-            if np.ptp(each, axis=0).max(initial=0.0) > COARSE * np.abs(each).max(initial=0.0):
+            if np.ptp(each, axis=0).max(initial=0.0) > max(COARSE * np.abs(each).max(initial=0.0), least / self.pulse):
                 return True
         return False
 
     def use_large_pulses(self, rungs: Sequence[Rung]) -> None:
-        """Take large pulses of several sizes: of each input that to which, and to larger ones, responses agree best."""
+        """Take large pulses of several sizes: of each input the largest up to which responses agree."""
         self.sizes, self.parts, self.largest, self.pulse = SIZES, LINEAR_PART, np.inf, LARGE_PULSE
         found = [self.response(i, rungs) for i in range(len(self.inputs))]
         usual = np.max([np.abs(one).max(axis=0) for one in found], axis=0, initial=0.0)
@@ -281,26 +297,36 @@ class Excitation:
             for factor in LARGE_FACTORS:
                 self.scale = scale * factor
                 found.append(self.response(i, rungs) / factor / usual)
-            apart = [float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(found)]
-            scale[i] *= LARGE_FACTORS[int(np.nanargmin([*apart, np.inf]))]
+            apart = np.array([np.abs(one - other).max(initial=0.0) for one, other in pairwise(found)])
+            alike = np.flatnonzero(apart <= LEAST * np.nanmin(apart, initial=np.inf))
+            scale[i] *= LARGE_FACTORS[int(alike[-1]) if len(alike) else 0]
         self.scale = scale
 
-    def expect_response(self, rungs: Sequence[Rung]) -> None:
-        """Raise `ImpreciseError` for an input of which outputs follow large deviations, but small ones not at all."""
+    def drowns(self, rungs: Sequence[Rung]) -> bool:
+        """Whether outputs follow large deviations of an input, but small ones not at all, as in single precision.
+
+        Raises `ImpreciseError` for an input of which they do not follow what single precision resolves.
+        """
         small = [self.response(i, rungs) for i in range(len(self.inputs))]
         usual = np.max([np.abs(one).max(axis=0, initial=0.0) for one in small], axis=0, initial=0.0)
-        chosen = self.pulse, self.largest
+        chosen, found = (self.pulse, self.largest), False
         self.largest = np.inf
         for i in (i for i, one in enumerate(small) if not one.any()):
-            for self.pulse in LARGER:
+            before = chosen[0]
+            for self.pulse in (pulse for pulse in LARGER if pulse > before):
                 follows = np.abs(self.response(i, rungs)).max(axis=0, initial=0.0)
                 if (follows > FOLLOWS * usual).any():
-                    raise ImpreciseError(
-                        f"{self.name} follows a change of {self.inputs[i]} by {self.pulse:g}, but not by "
-                        f"{chosen[0]:g}, as code that quantises, or with a dead zone: what small deviations do cannot "
-                        "be told"
-                    )
+                    if float(follows.max()) * before > STANDS_OUT * SINGLE:
+                        raise ImpreciseError(
+                            f"{self.name} follows a change of {self.inputs[i]} by {self.pulse:g}, but not by "
+                            f"{before:g}, as code that quantises, or with a dead zone: what small deviations do cannot "
+                            "be told"
+                        )
+                    found = True
+                    break
+                before = self.pulse
         self.pulse, self.largest = chosen
+        return found
 
     # -- how far it is linear -------------------------------------------------------------------------------------
 

@@ -30,6 +30,8 @@ FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""
 SHRUNK = (1.0, 0.3, 0.1)
 """Factors on the pulses, tried in turn"""
+ROUGH = 1e-4
+"""Precision of a component that rounds coarsely, with which smaller pulses are not tried"""
 FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
@@ -87,8 +89,7 @@ def of_samples(rest: Rest, period: float) -> SampledRest:
 def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung]) -> int:
     """Choose the pulses, large ones for a component that rounds coarsely; the rungs over which it is linear."""
     count = excitation.choose_pulse(rungs)
-    excitation.expect_response(rungs[:FEW])
-    if excitation.rounds_coarsely(rungs[:FEW]):
+    if excitation.drowns(rungs[:FEW]) or excitation.rounds_coarsely(rungs[:FEW]):
         excitation.use_large_pulses(rungs[:FEW])
         count = len(rungs)
     return count
@@ -100,6 +101,7 @@ def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
 
     def proved(excitation: Excitation) -> Tangent:
         tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
+        tangent.fit(sample.h, 2.0 * len(ladder) * sample.h)
         tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
         return tangent
 
@@ -109,13 +111,13 @@ def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
         smaller.pulse = factor * excitation.pulse
         try:
             found.append(proved(smaller))
-            if found[-1].accuracy <= COARSE:
+            if max(found[-1].accuracy, found[-1].precision) <= (ROUGH if excitation.is_coarse else COARSE):
                 break
         except UsageError as error:
             refused.append(error)
     if not found:
         raise (ImpreciseError if excitation.is_coarse else UsageError)(str(refused[0]))
-    return min(found, key=lambda one: one.accuracy)
+    return min(found, key=lambda one: max(one.accuracy, one.precision))
 
 
 def in_continuous_time(rest: Rest, period: float, step: float, *, unit: float | None = None) -> Tangent:

@@ -18,6 +18,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.excitation import (
     ROUNDING,
+    SINGLE,
+    STANDS_OUT,
     Errors,
     Excitation,
     ImpreciseError,
@@ -26,10 +28,9 @@ from orchestration.theory.stability.excitation import (
     SavedState,
     States,
 )
+from orchestration.theory.stability.fitted_model import LinearModel, fitted, responses_needed
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
-STANDS_OUT = 10.0
-"""Factor of the largest singular value of the errors: larger singular values are states"""
 SCALINGS = 4
 """Rounds in which rows and columns are scaled to errors of one size"""
 UNPROVEN = 1e-5
@@ -38,13 +39,14 @@ IMPRECISE = 1e-3
 """Error of a predicted response of a component that rounds coarsely, from which its model is refused"""
 PROOF_STEPS = 256
 """Steps of the random input, at most"""
+EXCITED = 0.75
+"""Share of the steps of a response that is fitted, after which the inputs are at rest"""
 LINEAR = 1e-6
 """Error allowed of what is predicted at another point of rest or from an initial state, relative to the largest"""
 
 
 SIMILAR = 10.0
 """Factor on the accuracy of a component that rounds coarsely, up to which it holds at another point of rest"""
-SINGLE = float(np.finfo(np.float32).eps)
 
 
 class Tangent(LinearSimulator):
@@ -68,7 +70,7 @@ class Tangent(LinearSimulator):
         self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
         self._fewest, self._most = fewest, most
         self._known: dict[int, tuple[Floats, Floats]] = {}
-        self.accuracy = 0.0
+        self.accuracy = self._spread = 0.0
         self._find_coordinates(excitation.errors_over(ladder), fewest)
         self.state = np.zeros(len(self._inverse))
 
@@ -79,8 +81,8 @@ class Tangent(LinearSimulator):
 
     @property
     def precision(self) -> float:
-        """The accuracy, relative, of a component that rounds coarsely; 0 of others."""
-        return self.accuracy if self._excitation.is_coarse else 0.0
+        """The accuracy, relative, of a component that rounds coarsely, at any frequency; 0 of others."""
+        return max(self.accuracy, self._spread) if self._excitation.is_coarse else 0.0
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""
@@ -141,7 +143,26 @@ class Tangent(LinearSimulator):
         """The same with pulses times a factor, at no more states: what rounding adds to them is none."""
         excitation = copy(self._excitation)
         excitation.pulse *= factor
-        return Tangent(excitation, self.ladder, self._fewest, unit=self.unit, most=len(self.state))
+        again = Tangent(excitation, self.ladder, self._fewest, unit=self.unit, most=len(self.state))
+        again.fit(*self._proof)
+        return again
+
+    def fit(self, h: float, duration: float) -> None:
+        """Fit it to responses to random inputs, in steps of `h` over a `duration` [s], where it rounds coarsely."""
+        if not self._excitation.is_coarse:
+            return
+        excitation, rng, rung = self._excitation, np.random.default_rng(1), self._rung(h)
+        model = LinearModel(matrix=np.hstack(self.derivatives(h)), states=len(self.state))
+        steps, states = _steps(h, duration), len(self.state)
+        count = responses_needed(model, steps)
+        if not count:
+            return
+        offsets, changes = (rng.uniform(-0.5, 0.5, (count, n, len(self.inputs))) for n in (1, steps))
+        moves = (offsets + changes) * excitation.pulses
+        moves[:, round(EXCITED * steps) :] = 0.0
+        found = fitted(model, moves, np.array([excitation.response_to(each, rung) for each in moves]))
+        self._known[round(h * NANOSECONDS)] = found.model.matrix[:, :states], found.model.matrix[:, states:]
+        self._spread = found.spread(excitation.pulses)
 
     def prove(self, h: float, duration: float) -> None:
         """Compare its response to a random input, in steps of `h` over a `duration` [s], with that of the component.
@@ -154,7 +175,7 @@ class Tangent(LinearSimulator):
     def _prove(self, excitation: Excitation) -> None:
         h, duration = self._proof
         rung, rng = self._rung(h), np.random.default_rng(0)
-        count = int(np.clip(duration / h, 2, PROOF_STEPS))
+        count = _steps(h, duration)
         moves = rng.uniform(-1.0, 1.0, (count, len(self.inputs))) * self._excitation.pulses
         moves[(count + 1) // 2 :] = 0.0
         measured, predicted = excitation.response_to(moves, rung), np.zeros((count, len(self.outputs)))
@@ -238,6 +259,10 @@ class Tangent(LinearSimulator):
 
     def _rung(self, h: float) -> Rung:
         return Rung(1, h) if self.unit is None else Rung(round(h / self.unit), self.unit)
+
+
+def _steps(h: float, duration: float) -> int:
+    return int(np.clip(duration / h, 2, PROOF_STEPS))
 
 
 def _most_independent(columns: Floats, count: int) -> list[int]:

@@ -220,13 +220,34 @@ def test_a_component_in_single_precision_is_measured_by_large_pulses() -> None:
     measured = tangent(fmu)
     assert measured.pulse > 1e-4
     assert len(measured.state) == 2
-    assert responses(measured, 4) == pytest.approx([0.9 * x for x in responses(Line(3), 4)], abs=1e-5)
+    assert responses(measured, 4) == pytest.approx([0.9 * x for x in responses(Line(3), 4)], abs=measured.precision)
     assert 0.0 < measured.precision < 1e-4
     assert tangent(Line(3)).precision == 0.0
     smaller = measured.with_pulse(0.25)
     assert (smaller.pulse, len(smaller.state)) == (0.25 * measured.pulse, 2)
     assert responses(smaller, 4) == pytest.approx(responses(measured, 4), abs=1e-4)
     assert len(Tangent(Excitation(rest(Line(3))), [Rung(1, 1.0)] * 8, 6, most=2).state) == 2  # of three
+
+
+class Integrating(Line):
+    """A PI law in single precision, whose integral moves by few of its last digits at a step."""
+
+    def __init__(self, proportional: float, integral: float) -> None:
+        super().__init__(1)
+        self.gains = np.float32(proportional), np.float32(integral)
+        self.kept = np.array([0.5, 0.5])  # the integral, and the output
+
+    def step(self, t: float, h: float) -> None:
+        (proportional, integral), held, u = self.gains, np.float32(self.kept[0]), np.float32(self.u)
+        self.kept = np.array([held + integral * u, proportional * u + held], dtype=float)
+
+
+@pytest.mark.parametrize(("proportional", "integral"), [(4e-3, 8e-5), (1e-3, 8e-4)])
+def test_an_integral_in_single_precision_is_known_as_well_as_said(proportional: float, integral: float) -> None:
+    measured = tangent(Integrating(proportional, integral))
+    later = responses(measured, 3)
+    assert 0.0 < measured.precision < 1e-3
+    assert later == pytest.approx([proportional, integral, integral], rel=measured.precision)
 
 
 class Quantising(Line):
