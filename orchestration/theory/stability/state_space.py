@@ -13,8 +13,13 @@ SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
 """Samples of impulse responses, as long as they stay small"""
 LARGEST_RESPONSE = 1e6
 """Largest response, relative to the first"""
-MINIMAL = 1e-9
-"""Share of the largest singular value between inputs and outputs, each by its own unit: smaller ones count as 0"""
+MINIMAL, ROUNDING = 1e-9, 1e-13
+"""Shares of the largest singular value between inputs and outputs, each by its own unit: larger ones than the first are
+states, smaller ones than the second count as 0; of those in between as many as make the response right"""
+TURNS = np.linspace(0.05, 3.1, 8)
+"""Frequencies at which it has to be right, in radians per sample"""
+RIGHT = 1e-7
+"""Error of the response of an output, relative to its largest at that frequency"""
 
 
 @passable
@@ -68,11 +73,22 @@ def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
     (along, shows), (across, makes) = np.linalg.qr(observable), np.linalg.qr(reachable.T)
     left, values, right = np.linalg.svd(shows @ makes.T)  # no larger than A, however many signals and samples
     left, right = along @ left, right @ across.T
-    rank = int((values > MINIMAL * values[0]).sum())
-    root = np.sqrt(values[:rank])
-    back = reachable @ right[:rank].T / root
-    onto = (left[:, :rank] / root).T @ observable
-    return onto @ A @ back, onto @ B, C @ back
+    whole = _response(A, B, C)
+    fewest, most = (int((values > share * values[0]).sum()) for share in (MINIMAL, ROUNDING))
+    for rank in range(fewest, most + 1):
+        root = np.sqrt(values[:rank])
+        back = reachable @ right[:rank].T / root
+        onto = (left[:, :rank] / root).T @ observable
+        found = onto @ A @ back, onto @ B, C @ back
+        if (abs(_response(*found) - whole) <= RIGHT * abs(whole).max(axis=2, keepdims=True)).all():
+            break
+    return found
+
+
+def _response(A: Floats, B: Floats, C: Floats) -> Any:
+    """The outputs by the inputs at each of `TURNS`, shape (n, outputs, inputs)."""
+    z = np.exp(1j * TURNS)[:, None, None]
+    return C @ np.linalg.solve(z * np.eye(len(A)) - A, B.astype(complex)[None])
 
 
 def _powers(A: Floats, B: Floats) -> list[Floats]:

@@ -107,6 +107,12 @@ def test_what_no_input_moves_and_no_output_shows_is_left_out() -> None:
     assert reduced(np.eye(2), np.zeros((2, 1)), np.ones((1, 2)))[0].shape == (0, 0)
 
 
+def test_a_fast_state_beside_a_growing_one_is_left_out_only_if_the_response_stays_right() -> None:
+    A, B = np.diag([1.1, 0.9, 0.15]), np.ones((3, 1))
+    for small, states in ((1e-5, 3), (1e-12, 2)):
+        assert len(reduced(A, B, np.array([[1.0, 1.0, small]]))[0]) == states
+
+
 @pytest.mark.parametrize(
     ("name", "component", "expected"),
     [
