@@ -11,6 +11,7 @@ from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import in_columns, inform
+from orchestration.foundation.basics.unit_algebra import time_text
 
 if TYPE_CHECKING:
     from orchestration.systems.system.request import Request
@@ -224,4 +225,4 @@ def _summary(system: "StateSpace", samples: int) -> str:
         for names in (system.inputs, system.outputs)
     )
     each = "" if samples == 1 else f", each at {samples} samples"
-    return f"{inputs} → {outputs}{each}; {len(system.A)} states, every {system.dt:g} s"
+    return f"{inputs} → {outputs}{each}; {len(system.A)} states, every {time_text(system.dt)}"

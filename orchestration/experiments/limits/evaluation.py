@@ -98,7 +98,7 @@ class Evaluator:
             measured=measured if isinstance(measured, float) and math.isfinite(measured) else None,
             unmet=None if failed is None else unmet(system, failed, self.units),
         )
-        self.announce(f"{self.varied.of} {value:.6g}{self.span.unit}: {describe(evaluation)}")
+        self.announce(f"{self.varied.of} {self.span.text(value)}: {describe(evaluation)}")
         return evaluation
 
 

@@ -15,6 +15,7 @@ from orchestration.experiments.limits.limit_result import Limit
 from orchestration.experiments.studies import figures
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -130,7 +131,7 @@ def _draw_limits(axes: Axes, result: Limit, across: Quantity) -> None:
 
 
 def _title(result: Limit, across: Quantity) -> str:
-    what, until = across.name, f", in runs of {result.horizon:g} s"
+    what, until = across.name, f", in runs of {time_text(result.horizon)}"
     low, high = (
         None if limit is None else across.text_of(limit, DIGITS)
         for limit in (result.large_signal_lower_limit, result.large_signal_limit)

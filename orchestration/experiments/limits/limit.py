@@ -7,7 +7,7 @@ from typing import Literal
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
 from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
-from orchestration.foundation.basics.bisection import Bracket, Range, bisected, ends_of_good
+from orchestration.foundation.basics.bisection import DIGITS, Bracket, Range, bisected, ends_of_good
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter
@@ -107,7 +107,7 @@ def find(
     note += other_periods_in_words(varied.at(span.last), models)
     tried = tuple(trials.tried[value] for value in sorted(trials.tried))
     return Limit(
-        of=of, unit=span.unit.strip() or None, judged=metric, judged_unit=units.get(metric or ""),
+        of=of, unit=span.unit, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else bound_of(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
         local_accuracy=local.accuracy, local_lower_limit=local.lower, mean_square_limit=mean_square.limit,
@@ -154,7 +154,6 @@ _IN_ITS_UNIT = (
 )  # fmt: skip
 """Fields in the unit of the quantity"""
 _OF_UNITS = ("unit", "judged_unit")
-DIGITS = 6
 
 
 def as_text(limit: Limit) -> dict[str, str]:
@@ -169,7 +168,7 @@ def as_text(limit: Limit) -> dict[str, str]:
         texts["flies_above"] = ", ".join(quantity(value, limit.unit, DIGITS) for value in limit.flies_above)
     if (ideal := limit.continuous) is not None:
         settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
-        texts["continuous"] = f"{ideal.outcome} at a period of {ideal.period:g} s{settles}"
+        texts["continuous"] = f"{ideal.outcome} at a period of {quantity(ideal.period, 's')}{settles}"
     texts["tried"] = f"{len(limit.tried)} values"
     return texts
 
@@ -190,7 +189,7 @@ def shares_as_text(limit: Limit) -> list[list[str]]:
 def _mean_square_note(found: LinearLimit, span: Range) -> list[str]:
     """The note on the mean-square limit."""
     if found.limit is not None:
-        return [f"from {found.limit:.6g}{span.unit} on means of squares have no finite expectation"]
+        return [f"from {span.text(found.limit)} on means of squares have no finite expectation"]
     return [found.reason] if found.reason else []
 
 
@@ -224,28 +223,28 @@ def _note(
     parts = []
     if refuted is not None:
         parts.append(
-            f"that nine seeds in ten are good is refuted at {refuted:.6g}{span.unit}: {describe(trials.tried[refuted])}"
+            f"that nine seeds in ten are good is refuted at {span.text(refuted)}: {describe(trials.tried[refuted])}"
         )
-    parts.append(f"what is narrower than the scan, {span.step:g}{span.unit}, is not seen")
+    parts.append(f"what is narrower than the scan, {span.text(span.step)}, is not seen")
     if max(trials.tried) < span.values()[-1]:
         least, most = min(trials.tried), max(trials.tried)
-        where = f"from {least:.6g} to {most:.6g}{span.unit}" if least < most else f"only {least:.6g}{span.unit}"
+        where = f"from {span.text(least)} to {span.text(most)}" if least < most else f"only {span.text(least)}"
         parts.append(f"scanned {where}: beyond that nothing is known")
     if found.lower is not None:
-        parts.append(f"below {found.lower:.6g}{span.unit} small deviations grow, too")
+        parts.append(f"below {span.text(found.lower)} small deviations grow, too")
     if found.reason:
         parts.append(found.reason)
     if local is None:
         return parts
     measured = None if bracket is None else bracket.good
     if measured is None:
-        return [*parts, f"the local limit is {local:.6g}{span.unit}"]
+        return [*parts, f"the local limit is {span.text(local)}"]
     if measured > (1.0 + GAP) * local:
         return [
             *parts,
-            f"more than a tenth beyond the local limit of {local:.6g}{span.unit}, from which on small motions grow: it "
+            f"more than a tenth beyond the local limit of {span.text(local)}, from which on small motions grow: it "
             "may oscillate, and what is judged is good still",
         ]
     if measured < (1.0 - GAP) * local:
-        return [*parts, f"more than a tenth below the local limit of {local:.6g}{span.unit}: large signals decide"]
-    return [*parts, f"within a tenth of the local limit of {local:.6g}{span.unit}"]
+        return [*parts, f"more than a tenth below the local limit of {span.text(local)}: large signals decide"]
+    return [*parts, f"within a tenth of the local limit of {span.text(local)}"]

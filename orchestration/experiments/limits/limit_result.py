@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from orchestration.experiments.limits.evaluation import Evaluation
+from orchestration.foundation.basics.bisection import DIGITS
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.results import html
@@ -12,10 +13,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from orchestration.simulation.figures.gallery import Figures
-
-
-DIGITS = 6
-"""Digits of its values in a sentence"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,11 @@ from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
+from orchestration.foundation.basics.unit_algebra import quantity
+
+DIGITS = 6
+"""Significant digits of a value in a sentence"""
+
 Fails = Callable[[float], bool]
 ReportRemaining = Callable[[int], None]
 """Called before each trial with the largest number of trials that can follow it."""
@@ -39,7 +44,11 @@ class Range:
     step: float
     last: float
     tolerance: float
-    unit: str = " s"
+    unit: str | None = "s"
+
+    def text(self, value: float) -> str:
+        """A value of the quantity in its unit."""
+        return quantity(value, self.unit, DIGITS)
 
     def values(self) -> list[float]:
         """The values of the scan, in rising order."""

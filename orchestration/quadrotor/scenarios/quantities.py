@@ -21,5 +21,5 @@ def range_of(timing: Timing, of: str) -> Range | None:
     if of == "loss":
         length = timing.burst_length
         last = 1.0 if length is None else length / (length + 1.0)
-        return Range(first=0.0, step=0.05, last=last, tolerance=0.01, unit="")
+        return Range(first=0.0, step=0.05, last=last, tolerance=0.01, unit=None)
     return None

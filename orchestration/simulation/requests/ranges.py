@@ -106,7 +106,7 @@ def search_range(
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
     if known is not None and named is None and (first is None or last is None):
-        inform(f"--of {varied.of}: searched from {low:g} to {high:g}{known.unit}; --from and --to set others")
+        inform(f"--of {varied.of}: searched from {low:g} to {high:g}{after(known.unit)}; --from and --to set others")
     before = known.before if known is not None and first is None else ()
     own = varied.own if first is None else None
     step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
@@ -117,7 +117,7 @@ def search_range(
         step=step,
         last=high,
         tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
-        unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)),
+        unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)).strip() or None,
     )
 
 
@@ -152,7 +152,7 @@ def _range_by_period(varied: Varied) -> Range | None:
     if name == "loss" and ends:
         length = ends[0].burst_length
         return Range(
-            first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit=""
+            first=0.0, step=0.05, last=1.0 if length is None else length / (length + 1.0), tolerance=0.01, unit=None
         )
     periods = [
         float(sampling.true_period) / NANOSECONDS

@@ -41,9 +41,7 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
     if bracket is None:
         return LinearLimit(reason="second moments are bounded up to the end of the range")
     if bracket.good is None:
-        return LinearLimit(
-            reason=f"second moments grow without bound at {values[0]:.6g}{span.unit}, where the scan begins"
-        )
+        return LinearLimit(reason=f"second moments grow without bound at {span.text(values[0])}, where the scan begins")
     return LinearLimit(limit=0.5 * (bracket.good + bracket.bad))
 
 

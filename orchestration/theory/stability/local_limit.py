@@ -190,10 +190,10 @@ def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimi
         for is_bad, run in groupby(sorted(tried.items()), key=lambda one: one[1] > 0.0)
         if is_bad
     ]
-    each = [f"{run[0]:.6g}" if len(run) == 1 else f"{run[0]:.6g} to {run[-1]:.6g}" for run in runs]
+    each = [" to ".join(map(span.text, dict.fromkeys((run[0], run[-1])))) for run in runs]
     reason = (
-        f"local: small deviations grow at {some(each, ', ') + span.unit if each else 'none'}, of {len(tried)} values "
-        f"from {rates.scan[0]:.6g} to {rates.scan[-1]:.6g}{span.unit} at which the several rates repeat together: "
+        f"local: small deviations grow at {some(each) if each else 'none'}, of {len(tried)} values "
+        f"from {span.text(rates.scan[0])} to {span.text(rates.scan[-1])} at which the several rates repeat together: "
         "stability need not be an interval, and others between may be unstable"
     )
     limit = _middle(upper)
@@ -226,10 +226,10 @@ def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> Lin
     lower, upper = (None if end is None or end.good is None else 0.5 * (end.good + end.bad) for end in ends)
     reason = ""
     if ends.upper is None:
-        start = "throughout the range" if lower is None else f"from {lower:.6g}{span.unit} to the end of the range"
+        start = "throughout the range" if lower is None else f"from {span.text(lower)} to the end of the range"
         reason = f"small deviations decay {start}"
     elif upper is None:
-        reason = f"small deviations grow at {values[0]:.6g}{span.unit}, where the scan begins"
+        reason = f"small deviations grow at {span.text(values[0])}, where the scan begins"
     return LinearLimit(
         limit=upper, lower=lower, method=method, accuracy=None if upper is None else width, reason=reason
     )

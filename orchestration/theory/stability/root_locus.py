@@ -148,9 +148,8 @@ def locus(
     span = search_range(
         varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
     )
-    unit = span.unit.strip() or None
-    values = [_short(float(value), unit) for value in np.linspace(span.values()[0], span.last, count)]
-    return isolated_call(files.fmus.values(), _root_locus, varied, values, unit)
+    values = [_short(float(value), span.unit) for value in np.linspace(span.values()[0], span.last, count)]
+    return isolated_call(files.fmus.values(), _root_locus, varied, values, span.unit)
 
 
 def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLocus:

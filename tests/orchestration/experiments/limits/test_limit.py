@@ -573,7 +573,7 @@ def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monke
     assert found.flies_above == (0.045, 0.05, 0.055)
     assert [one.value for one in found.tried if one.value >= 0.035] == [0.035, 0.04, 0.045, 0.05, 0.055]
     assert found.scan == 0.005
-    assert "narrower than the scan, 0.005 s, is not seen" in found.note
+    assert "narrower than the scan, 5 ms, is not seen" in found.note
     coarse = find(scenario_of(), "period", scan=0.05)
     assert (coarse.scan, coarse.large_signal_limit) == (0.05, None), "as its help says, it sees no gap that small"
 
@@ -590,7 +590,7 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
         "period good from 6.25 ms up to 31.5 ms; diverges at 31.75 ms; diverges at 6 ms (scan 5 ms, tolerance 0.5 ms)"
     )
     assert (found.large_signal_limit, found.large_signal_lower_limit) == (0.0315, 0.00625)
-    assert "scanned from 0.005 to 0.055 s: beyond that nothing is known" in found.note
+    assert "scanned from 5 ms to 55 ms: beyond that nothing is known" in found.note
     from_below = find(scenario_of(), "period", first=0.005)
     assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (None, None)
     assert from_below.verdict.startswith("period not good even at 5 ms, where the scan begins: diverged; good again at")
@@ -699,7 +699,7 @@ def test_each_value_is_announced() -> None:
     lines: list[str] = []
     find(scenario_of(), "period", announce=lines.append)
     assert lines[0] == "engine compiled: native FMUs, one run at a time"
-    assert lines[1] == "period 0.01 s: settled"
+    assert lines[1] == "period 10 ms: settled"
     assert "period 0.001 s: settled" in lines
     assert "period 0.03 s: settled" in lines
     assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in lines

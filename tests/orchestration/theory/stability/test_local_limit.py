@@ -29,9 +29,9 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     found = local_limit.about_rest(at, replace(SPAN, own=0.4))
     assert (found.lower, found.limit) == pytest.approx((0.31, 0.52), abs=1e-4)
     assert "this quantity changes nothing" in local_limit.about_rest(lambda value: at(0.4), SPAN).reason
-    assert local_limit.about_rest(at, SPAN).reason == "small deviations grow at 0.05 s, where the scan begins"
+    assert local_limit.about_rest(at, SPAN).reason == "small deviations grow at 50 ms, where the scan begins"
     below = local_limit.about_rest(at, replace(SPAN, last=0.45, own=0.4))
-    assert below.reason == "small deviations decay from 0.309985 s to the end of the range"
+    assert below.reason == "small deviations decay from 309.985 ms to the end of the range"
 
 
 @pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, 0.5), (1e9, None)])
@@ -75,10 +75,10 @@ def test_a_period_among_several_rates_has_no_limit_beyond_a_value_that_is_unstab
     assert found.limit is not None
     assert found.accuracy is not None
     assert (found.limit - found.accuracy, found.limit + found.accuracy) == pytest.approx((0.1912, 0.1916))
-    named = "local: small deviations grow at 0.192, 0.904 to 1 s, of 134 values from 0.05 to 1 s at which"
+    named = "local: small deviations grow at 192 ms, 904 ms to 1 s, of 134 values from 50 ms to 1 s at which"
     assert found.reason.startswith(named)
     none = local_limit.about_rest(two, replace(SPAN, last=0.15))
     assert none.limit is None
-    assert none.reason.startswith("local: small deviations grow at none, of 15 values from 0.05 to 0.15 s")
+    assert none.reason.startswith("local: small deviations grow at none, of 15 values from 50 ms to 150 ms")
     monkeypatch.setattr(local_limit, "hyperperiod_of", lambda system: None)
     assert "at no value of the scan" in local_limit.about_rest(two, SPAN).reason
