@@ -19,6 +19,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.terminal import stated_beside_bar
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.engines.algebraic_loops import in_words
 from orchestration.simulation.engines.resolved import resolve_with_models
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
@@ -32,6 +33,7 @@ from orchestration.theory.stability.identification import FINEST, SampledRest, i
 from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.operating_point import (
+    NotAnEquilibriumError,
     deterministic,
     exchanged_signals,
     expect_rest,
@@ -42,6 +44,8 @@ from orchestration.theory.stability.operating_point import (
 
 SETTLED = 6
 """periods of the run to rest, after messages in transit have arrived"""
+INSTANTS = 1001
+"""instants at which it is seen whether a source changes meanwhile"""
 HELD = 2
 """messages that a first-order hold remembers"""
 
@@ -292,7 +296,24 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
             why = master.divergence or master.running.termination or "it was interrupted"
             raise UsageError(f"the run leaves the operating point: {why}")
         rows.append([master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)])
-    expect_rest(system, np.array(rows))
+    end = float(begin + (SETTLED - 1) * period) / NANOSECONDS
+    try:
+        expect_rest(system, np.array(rows))
+    except NotAnEquilibriumError as error:
+        for signal, change in _changes_of_sources(simulation, end):
+            raise NotAnEquilibriumError(
+                f"the operating point is not at rest: source {signal} changes after {quantity(change, 's', 2)}, while "
+                f"the loop comes to rest over {quantity(end, 's', 2)}: expected it to change later, or not at all"
+            ) from error
+        raise
+
+
+def _changes_of_sources(simulation: PreparedRun, end: float) -> Iterator[tuple[str, float]]:
+    """The signals of sources that change until `end` [s], and when first."""
+    times = np.linspace(0.0, end, INSTANTS)
+    for signals, values in simulation.master.running.sources:
+        changed = values.over(times) != values.over(times[:1])
+        yield from ((signal, float(times[one.argmax()])) for signal, one in zip(signals, changed.T) if one.any())
 
 
 # -- instances that trace what is written to them ----------------------------------------------------------------------

@@ -17,7 +17,7 @@ from orchestration.quadrotor.flight.hover import at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.component import Component, Sampling
-from orchestration.systems.system.connection import Connection
+from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import local_limit as local
@@ -153,6 +153,13 @@ def test_a_point_that_is_not_at_rest_is_refused_naming_what_moves(
     with pytest.raises(UsageError, match=expected) as caught:
         growth_of_loop(dataclasses.replace(system, operating_point=moving), instances)
     one_line(caught.value)
+
+
+def test_a_source_that_changes_before_the_loop_rests_is_named(instances: Instances, tmp_path: Path) -> None:
+    (tmp_path / "load.csv").write_text("time,w\n0,0\n3,1\n1000000,1\n")
+    load = Source(file=tmp_path / "load.csv", interpolation="previous", to=("plant.w",))
+    with pytest.raises(UsageError, match=r"not at rest: source load\.w changes after 3 s, while the loop .* 7 s: exp"):
+        growth_of_loop(dataclasses.replace(example("minimum_variance"), sources={"load": load}), instances)
 
 
 def test_sampled_components_without_a_common_hyperperiod_are_refused(system: System, instances: Instances) -> None:
