@@ -15,6 +15,7 @@ import numpy as np
 from orchestration.components.fmi.instance import Instance
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.stability.operating_point import AT_REST
 
 PULSE = 1e-6
 """Pulse of an input, up and down, with which the search for the best one begins: relative to its value, or absolute
@@ -142,9 +143,10 @@ class Excitation:
         return self._fmu.name
 
     def is_like(self, other: "Excitation") -> bool:
-        """Whether it is of the same instance and signals, at rest with the same inputs."""
-        signals = (self.inputs, self.outputs) == (other.inputs, other.outputs)
-        return self._fmu is other._fmu and signals and np.array_equal(self.held, other.held)
+        """Whether it is of the same instance and signals, at rest with the same inputs, as nearly as rest is."""
+        if self._fmu is not other._fmu or (self.inputs, self.outputs) != (other.inputs, other.outputs):
+            return False
+        return bool((np.abs(self.held - other.held) <= AT_REST * self.scale).all())
 
     def measure_as(self, other: "Excitation") -> None:
         """Take the pulses of another excitation, of one or several samples of it."""

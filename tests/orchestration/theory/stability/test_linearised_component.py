@@ -186,6 +186,7 @@ def test_a_model_holds_where_the_same_instance_rests_again_and_responds_alike() 
     assert responses(again, 4) == before
     assert measured.about(rest(Switched(3))) is None
     assert measured.about(dataclasses.replace(rest(fmu), held=np.ones(1))) is None
+    assert measured.about(dataclasses.replace(rest(fmu), held=np.full(1, 1e-9))) is not None
     fmu.gain = 10.0
     assert measured.about(rest(fmu)) is None
 
