@@ -209,7 +209,10 @@ def expect_rows(system: System, tasks: Sequence[SampledTask], links: Sequence[Ra
         on_grid = sends_on_grid and link.delay_jitter.is_certain and on_grid_all(*link.send_offsets, *lateness)
         read_later = system.components[system.connections[i].receiver].sampling is not None and not link.is_measured
         if not on_grid and (not single or read_later):
-            raise UsageError(f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}")
+            raise UsageError(
+                f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}: expected a step of "
+                "which its delay is a multiple, or expect without --as-simulated"
+            )
         if link.is_read_ahead and Fraction(link.longest_delay, ATTOSECONDS) % step:
             raise UsageError(
                 f"--as-simulated: {link.name} is measured between the steps of {', '.join(continuous)}: "

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import Model
@@ -15,11 +16,12 @@ from orchestration.systems.system.request import Request
 from orchestration.theory.exact.loops import Loops
 from orchestration.theory.exact.objectives import inlined_objectives, means_of
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit, rested
+from orchestration.theory.stability.sign_changes import zero_between
 
 LIMIT_TOLERANCE = 0.01
 """Share of the tolerance of a measured limit"""
-RADIUS_TOLERANCE = 1e-6
-"""Difference of a radius allowed from order to order"""
+RADIUS_TOLERANCE, ROOT = 1e-6, 1e-9
+"""Difference of a radius allowed from order to order, and from 1 at a limit"""
 
 
 def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
@@ -33,16 +35,19 @@ def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) 
 
 
 def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> LinearLimit:
-    def fails(value: float) -> bool:
-        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) >= 1.0
+    @cache
+    def above(value: float) -> float:
+        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) - 1.0
 
     values = span.values()
-    bracket = ends_of_good(fails, values, span.own, LIMIT_TOLERANCE * span.tolerance).upper
+    bracket = ends_of_good(lambda value: above(value) >= 0.0, values, span.own, LIMIT_TOLERANCE * span.tolerance).upper
     if bracket is None:
         return LinearLimit(reason="second moments are bounded up to the end of the range")
     if bracket.good is None:
         return LinearLimit(reason=f"second moments grow without bound at {span.text(values[0])}, where the scan begins")
-    return LinearLimit(limit=0.5 * (bracket.good + bracket.bad))
+    good, bad = ((value, above(value)) for value in (bracket.good, bracket.bad))
+    low, high = zero_between(above, lambda value: value, good, bad, ROOT)
+    return LinearLimit(limit=0.5 * (low + high))
 
 
 SURE_TOLERANCE = 1e-3

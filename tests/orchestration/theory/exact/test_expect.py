@@ -4,17 +4,21 @@ import dataclasses
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from orchestration.foundation.basics.bisection import Range
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import Source
 from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.theory.exact import mean_square
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
 from orchestration.theory.exact.timing import sampled_tasks
@@ -228,3 +232,18 @@ def test_a_task_that_minds_how_long_its_step_is_has_no_jitter() -> None:
         expect_same_steps(system, sampled_tasks(system), {"controller": minding})
     regular = example("minimum_variance")
     expect_same_steps(regular, sampled_tasks(regular), {"controller": minding})
+
+
+def test_a_mean_square_limit_is_as_exact_as_the_radius() -> None:
+    class Radii:
+        def radius(self, system: System, *, agree: float) -> float:
+            return 0.8 + 0.7 * system.stop_time**2
+
+    span = Range(first=0.1, step=0.1, last=1.0, tolerance=0.2)
+    found = mean_square._crossing(
+        System(stop_time=0.1, components={"plant": Component(fmu="none", step=0.1)}, connections=()),
+        ["stop_time"],
+        span,
+        cast(Loops, Radii()),
+    )
+    assert found.limit == pytest.approx(math.sqrt(2.0 / 7.0), abs=1e-8)
