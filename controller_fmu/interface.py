@@ -31,7 +31,7 @@ class ControllerInterface(Framed):
     position = Input("measured position P, inertial frame", "m", ZERO, frame=frames.inertial, terminal="motion")
     velocity = Input("measured velocity V, inertial frame", "m/s", ZERO, frame=frames.inertial, terminal="motion")
     quaternion = Input(
-        "measured attitude Q, inertial to body; all zero: no measurement",
+        "measured attitude Q, body to inertial; all zero: no measurement",
         "1",
         _UPRIGHT,
         frame=frames.attitude,

@@ -17,6 +17,6 @@ class Measurement(NamedTuple):
     velocity: Vec3
     """V [m/s], inertial"""
     quaternion: Quaternion
-    """Q, unit, inertial to body"""
+    """Q, unit, body to inertial"""
     angular_velocity: Vec3
     """Ω [rad/s], body"""

@@ -47,7 +47,7 @@ def body_matrix(turned: Scalar, J: Inertia) -> Inertia:
 
 
 def attitude(turned: Scalar, Q: Quaternion) -> Quaternion:
-    """An attitude, inertial to body: with half turns about north-east before it and about forward after it."""
+    """An attitude, body to inertial: with half turns about forward before it and about north-east after it."""
     x, y, z, w = Q
     other = Quaternion.from_xyzw(_HALF * (x + y), _HALF * (x - y), _HALF * (w - z), _HALF * (w + z))
     return Quaternion.where(turned, other, Q)

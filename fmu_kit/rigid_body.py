@@ -47,7 +47,7 @@ class RigidState:
         self.velocity = velocity
         """V [m/s], inertial"""
         self.quaternion = quaternion
-        """Q, inertial to body"""
+        """Q, body to inertial"""
         self.angular_velocity = angular_velocity
         """Ω [rad/s], body"""
 

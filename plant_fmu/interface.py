@@ -40,7 +40,7 @@ class PlantInterface(Framed):
 
     position = _motion("position P, inertial frame", "m", ZERO, frames.inertial)
     velocity = _motion("velocity V, inertial frame", "m/s", ZERO, frames.inertial)
-    quaternion = _motion("attitude Q, inertial to body, scalar last", "1", Quaternion(ZERO, 0.0), frames.attitude)
+    quaternion = _motion("attitude Q, body to inertial, scalar last", "1", Quaternion(ZERO, 0.0), frames.attitude)
     angular_velocity = _motion("angular velocity, body frame", "rad/s", ZERO, frames.body)
 
     mass = FixedParameter("mass m", "kg", _BODY.mass, above=0.0)

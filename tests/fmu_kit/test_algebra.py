@@ -9,6 +9,7 @@ import pytest
 import sympy
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
 from orchestration.simulation.engines.sources import NUMPY
@@ -165,6 +166,12 @@ def test_opposite_quaternions_are_the_same_rotation(Q: Quaternion, v: Vec3) -> N
     assert (-Q).to_body(v) == Q.to_body(v)
     assert (-Q).to_inertial(v) == Q.to_inertial(v)
     assert (-Q).z_axis() == Q.z_axis()
+
+
+def test_an_attitude_is_the_rotation_from_body_to_inertial_frame_that_scipy_has() -> None:
+    turn, v = Rotation.from_rotvec([0.4, -1.1, 0.7]), Vec3(0.3, 2.0, -1.0)
+    found = Quaternion.from_xyzw(*turn.as_quat().tolist()).to_inertial(v)
+    np.testing.assert_allclose([*found], turn.apply([*v]), rtol=0.0, atol=ROUNDING)
 
 
 @given(quaternions, vectors)

@@ -100,7 +100,7 @@ def sliding(e: Series, p: Parameters) -> Series:
 def evaluate(P: Array, V: Array, Q: Array, Omega: Array, reference: Array, p: Parameters) -> dict[str, Array]:
     """Command and all that it is made of, by the names of the tables.
 
-    `P` [m], `V` [m/s] inertial; `Q` x, y, z, w, inertial to body; `Omega` [rad/s] body; `reference`: the rows
+    `P` [m], `V` [m/s] inertial; `Q` x, y, z, w, body to inertial; `Omega` [rad/s] body; `reference`: the rows
     P_d, V_d, A_d, J_d, S_d.
     """
     R = [rotation(Q), -skew(Omega) @ rotation(Q)]
