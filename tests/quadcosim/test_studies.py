@@ -207,7 +207,7 @@ def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]
     found = quadcosim.limit(system, "connections.valve.delay", first=0.0, last=0.2, scan=0.1, tolerance=0.05)
     assert found.to_pandas()["value"].tolist() == [one.value for one in found.tried]
     assert repr(found) == f"<Limit: {found.verdict}>"
-    assert "connections.valve.delay 0.1 s: good" in capsys.readouterr().err
+    assert "connections.valve.delay 100 ms: good" in capsys.readouterr().err
     assert "last value that is good" in found._repr_html_()
     figure = found.plot(style="paper")["limit"]
     assert figure.get_figwidth() == pytest.approx(STYLES["paper"].width / 25.4)

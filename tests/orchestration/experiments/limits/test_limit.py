@@ -702,7 +702,7 @@ def test_each_value_is_announced() -> None:
     assert lines[1] == "period 10 ms: settled"
     assert "period 1 ms: settled" in lines
     assert "period 30 ms: settled" in lines
-    assert "period 0.035 s: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in lines
+    assert "period 35 ms: fails, bounded: ultimate_bound = 1 m, expected < 0.05 m" in lines
 
 
 @pytest.mark.usefixtures("stubbed")
