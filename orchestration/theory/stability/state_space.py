@@ -18,8 +18,8 @@ MINIMAL, ROUNDING = 1e-9, 1e-13
 states, smaller ones than the second count as 0; of those in between as many as make the response right"""
 TURNS = np.linspace(0.05, 3.1, 8)
 """Frequencies at which it has to be right, in radians per sample"""
-RIGHT = 1e-7
-"""Error of the response of an output, relative to its largest at that frequency"""
+RIGHT = 1e-5
+"""Error of the response of an output, relative to its largest at that frequency: what models are measured to"""
 
 
 @passable
