@@ -81,6 +81,9 @@ class Connection:
         require_losses(self, self.burst_length, "loss")
         for what, values in (("noise", self.noise), ("quantisation", self.quantisation)):
             for name, value in values.items():
+                if isinstance(value, str) and value.startswith("{"):
+                    alone = f"connections.{self.name}.{what}.{name}=0.001"
+                    raise UsageError(f"{what} = {value}: expected one number for all signals, or for one as {alone}")
                 require(is_finite(value) and value >= 0.0, f"{what} of {name}", value, "zero or positive")
                 if not self.places(name):
                     raise UsageError(f"{what}: {name} is no signal of it; expected one of {', '.join(self._vectors())}")

@@ -163,6 +163,7 @@ def test_an_axis_that_a_system_does_not_have_is_refused_in_one_line(system: Syst
         (PERIOD, -1.0, f"{PERIOD} = -1.0: expected a positive number"),
         ("connections.command.loss", "often", "connections.command.loss = often: expected a probability"),
         ("connections.command.noise.u", "much", "connections.command.noise of u = much: expected zero or positive"),
+        ("connections.command.noise", "{u=1}", "for all signals, or for one as connections.command.noise.u=0.001"),
         ("connections.command.noise.v", 1.0, "connections.command.noise: v is no signal of it; expected one of u"),
         ("components.controller.fmu", 3.0, "fmu = 3.0: expected"),
     ],
