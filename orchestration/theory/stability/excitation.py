@@ -38,6 +38,8 @@ COARSE = 1e-5
 """Difference of responses to small pulses, relative, from which an instance is taken to round coarsely"""
 COARSER = 1e-11
 """Difference of the outputs then, which double precision rounds by less"""
+QUANTISED = 1e-5
+"""Difference of the outputs that no rounding of single precision explains"""
 STANDS_OUT = 10.0
 """Factor on errors: what is larger is none"""
 DITHER = (1.0, 1.137, 1.291, 1.443)
@@ -271,22 +273,31 @@ class Excitation:
     def rounds_coarsely(self, rungs: Sequence[Rung]) -> bool:
         """Whether responses to the chosen pulses differ by their sizes, more than a linear model may.
 
-        Or those to smaller ones, which are better if not for rounding.
+        Or those to smaller ones, which are better if not for rounding. Raises `ImpreciseError` where these differ by
+        more than single precision rounds.
         """
         chosen = self.pulse
         try:
-            return self._differs(rungs, 0.0) or (chosen > PULSE and self._differs(rungs, COARSER, PULSE))
+            if self._differs(rungs, 0.0):
+                self._differs(rungs, COARSER, PULSE)  # which may raise
+                return True
+            return chosen > PULSE and self._differs(rungs, COARSER, PULSE)
         finally:
             self.pulse = chosen
 
     def _differs(self, rungs: Sequence[Rung], least: float, pulse: float | None = None) -> bool:
-        self.pulse = pulse or self.pulse
+        self.pulse, found = pulse or self.pulse, False
         for i in range(len(self.inputs)):
-            found = [self.response(i, rungs, factor=factor) for factor in DITHER]
-            each = np.array([course[: min(map(len, found))] for course in found])
-            if np.ptp(each, axis=0).max(initial=0.0) > max(COARSE * np.abs(each).max(initial=0.0), least / self.pulse):
-                return True
-        return False
+            courses = [self.response(i, rungs, factor=factor) for factor in DITHER]
+            each = np.array([course[: min(map(len, courses))] for course in courses])
+            apart = float(np.ptp(each, axis=0).max(initial=0.0))
+            if self.pulse == PULSE and apart * PULSE > QUANTISED:
+                raise ImpreciseError(
+                    f"{self.name}: its outputs jump as {self.inputs[i]} changes by {PULSE:g}, by more than single "
+                    "precision rounds, as of code that quantises: what small deviations do cannot be told"
+                )
+            found |= apart > max(COARSE * float(np.abs(each).max(initial=0.0)), least / self.pulse)
+        return found
 
     def use_large_pulses(self, rungs: Sequence[Rung]) -> None:
         """Take large pulses of several sizes: of each input the largest up to which responses agree."""
