@@ -17,7 +17,7 @@ from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.model import System
 
 Points: TypeAlias = Callable[[Integers], Mapping[str, Booleans]]
-"""By component, whether each of some instants [ns] is a point of it"""
+"""Flags by component: whether each of some instants [ns] is a point of it"""
 
 
 def points_of(system: System, fixed: Mapping[str, FixedStep], end: int) -> Points | None:
@@ -52,7 +52,7 @@ def points_of(system: System, fixed: Mapping[str, FixedStep], end: int) -> Point
 def cut_at_points(system: System, chunks: Iterator[Chunk], points: Points) -> Iterator[Chunk]:
     """The same rows and events in chunks that end at points of all components; the last one ends where it does."""
     rest = InMemory()
-    """What is not handed on yet, after the last row that was"""
+    """Rows not handed on yet, after the last that was"""
     done = 0
     for chunk in chunks:
         rest.take(chunk)
