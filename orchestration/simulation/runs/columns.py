@@ -12,6 +12,7 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.errors import UsageError, prefixed, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.runs.arguments import values_by_path
+from orchestration.simulation.runs.labels import without_labels
 from orchestration.systems.system.check import check_parameter
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
@@ -28,6 +29,8 @@ class Columns:
     system: System
     given: Mapping[str, Any]
     """The arrays by target, as they were given"""
+    axes: Mapping[str, Any]
+    """The axes that they have by name, with their labels or None; empty: they have no names"""
     shape: tuple[int, ...]
     """The shape to which they broadcast: runs are counted in the order of C"""
     parameters: Mapping[str, Floats]
@@ -78,7 +81,8 @@ def columns(request: Request, system: System, models: Mapping[str, Model], value
     `values` has an array for each target that `request` knows. Raises `UsageError` for an unknown target, arrays that
     do not broadcast, and values that the FMUs do not accept.
     """
-    arrays = {target: _array(target, value) for target, value in values_by_path(values, "values =").items()}
+    unlabelled, axes = without_labels(values_by_path(values, "values ="))
+    arrays = {target: _array(target, value) for target, value in unlabelled.items()}
     shape = _common_shape(arrays)
     parameters: dict[str, Floats] = {}
     settings: dict[str, Sequence[Any]] = {}
@@ -102,7 +106,11 @@ def columns(request: Request, system: System, models: Mapping[str, Model], value
                 settings[path] = column.tolist()
                 _expect_accepted(system, models, path, np.unique(column))
     seeds = _seeds(settings.pop(SEED)) if SEED in settings else None
-    return Columns(system=system, given=arrays, shape=shape, parameters=parameters, seeds=seeds, settings=settings)
+    if [each if labels is None else len(labels) for labels, each in zip(axes.values(), shape)] != [*shape]:
+        axes = {}  # those of a part of the axes
+    return Columns(
+        system=system, given=arrays, axes=axes, shape=shape, parameters=parameters, seeds=seeds, settings=settings
+    )
 
 
 def first_differences(columns: Mapping[str, Any], parameters: Mapping[str, float]) -> list[int]:

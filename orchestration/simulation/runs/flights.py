@@ -12,6 +12,7 @@ from orchestration.foundation.basics.errors import Named, UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.statistics import Estimate, wilson
 from orchestration.simulation.results.objectives import OUTCOME, how_runs_ended
+from orchestration.simulation.runs.labels import RUN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +38,9 @@ class Flights(Mapping[str, Any]):
     """Why they did not run in lanes, in a line; None: they did."""
     units: Mapping[str, str] = field(default_factory=dict)
     """The units of the outputs and of the given values that have one, by name, as FMI writes them (`N.m`)."""
+    axes: Mapping[str, Any] = field(default_factory=dict)
+    """The axes of that shape by name, with their labels or None, where the given values have such: the index of a
+    table or of series of pandas (`run`), the dimensions of xarray."""
 
     def __getitem__(self, name: str) -> Any:
         """The array of a name."""
@@ -82,12 +86,14 @@ class Flights(Mapping[str, Any]):
     def to_pandas(self) -> "pd.DataFrame":
         """A row for each run, in the order of C: the values that were given, then the outputs.
 
-        Units are in its `attrs["units"]`, by column. Raises `QuadcosimError` where pandas is not installed.
+        It has the index of the table or of the series that were given. Units are in its `attrs["units"]`, by column.
+        Raises `QuadcosimError` where pandas is not installed.
         """
         import pandas as pd
 
         columns = {path: np.broadcast_to(each, self.shape) for path, each in self.given.items()} | self._outputs
-        table = pd.DataFrame({name: column.reshape(-1) for name, column in columns.items()})
+        index = next(iter(self.axes.values()), None) if len(self.shape) == 1 else None
+        table = pd.DataFrame({name: column.reshape(-1) for name, column in columns.items()}, index)
         table.attrs["units"] = dict(self.units)
         return table
 
@@ -95,9 +101,9 @@ class Flights(Mapping[str, Any]):
     def to_xarray(self) -> "xr.Dataset":
         """The outputs and what was recorded, over the axes of the given values, as a Dataset with units.
 
-        An axis along which alone a single path varies has its name and values; others are called
-        `run`, or `axis_0` and so on. Rows have the dimension `time` if the runs have the same times, as far as
-        they go, else `row`. Raises `QuadcosimError` where xarray is not installed.
+        Axes are those of the given values of xarray. Else an axis along which alone a single path varies has its name
+        and values; others are called `run`, or `axis_0` and so on. Rows have the dimension `time` if the runs have the
+        same times, as far as they go, else `row`. Raises `QuadcosimError` where xarray is not installed.
         """
         import xarray as xr
 
@@ -127,13 +133,16 @@ class Flights(Mapping[str, Any]):
             path: [axis + count - each.ndim for axis, length in enumerate(each.shape) if length > 1]
             for path, each in self.given.items()
         }
-        names = ["run"] if count == 1 else [f"axis_{axis}" for axis in range(count)]
+        names = [*self.axes] or ([RUN] if count == 1 else [f"axis_{axis}" for axis in range(count)])
         for axis in range(count):
             own = [path for path, axes in along.items() if axes == [axis]]
-            if len(own) == 1:
+            if len(own) == 1 and names[axis] in (RUN, f"axis_{axis}"):
                 names[axis] = own[0]
         coordinates: dict[str, Any] = {}
         for path, axes in along.items():
             values = self.given[path].reshape([self.shape[axis] for axis in axes])
             coordinates[path] = (tuple(names[axis] for axis in axes), values)
+        for name, labels in self.axes.items():
+            if name in names and labels is not None and labels.nlevels == 1:
+                coordinates.setdefault(name, (name, labels))
         return tuple(names), coordinates

@@ -59,12 +59,12 @@ def fly(
     """Run a system, or a scenario, many times, from arrays into arrays, without a store or a result for each run.
 
     `values` are arrays by path, as axes of a study name them (`plant.initial.position.x`, `timing.period`, `seed`).
-    They broadcast as NumPy's do, and outputs have the shape that they have together; with one value for each path that
-    is `()`. `outputs` are names of objectives, or of `outcome`, `good`, `horizon` [s], `diverged`, `divergence_time`
-    [s] and `steps`; default: all of them. `metrics` are objectives of your own by name, as expressions of the language
-    of objectives. `record` are columns whose rows are kept, with their `time`
-    [s], along one axis more. Numbers are float64, outcomes words; truth values are booleans, or 0.0 and 1.0
-    where some run has none.
+    They broadcast as NumPy's do, those of xarray by the names of their dimensions, and outputs have the shape that they
+    have together; with one value for each path that is `()`. `outputs` are names of objectives, or of `outcome`,
+    `good`, `horizon` [s], `diverged`, `divergence_time` [s] and `steps`; default: all of them. `metrics` are objectives
+    of your own by name, as expressions of the language of objectives. `record` are columns whose rows are kept, with
+    their `time` [s], along one axis more. Numbers are float64, outcomes words; truth values are booleans, or 0.0 and
+    1.0 where some run has none.
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
     else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
@@ -107,8 +107,8 @@ def fly(
     of_given = {target: unit_at(loaded.paths_of(target)[0], models) for target in runs.given}
     known = {"time": "s", "horizon": "s", "divergence_time": "s", **fits.units, **of_given}
     return Flights(
-        arrays=table.arrays, given=runs.given, recorded=table.recorded, shape=runs.shape, engine=engine, reason=reason,
-        units={name: unit for name in (*runs.given, *table.arrays) if (unit := known.get(name))},
+        arrays=table.arrays, given=runs.given, axes=runs.axes, recorded=table.recorded, shape=runs.shape, engine=engine,
+        reason=reason, units={name: unit for name in (*runs.given, *table.arrays) if (unit := known.get(name))},
     )  # fmt: skip
 
 

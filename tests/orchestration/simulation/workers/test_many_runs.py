@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import quadcosim
 from orchestration.foundation.basics.errors import QuadcosimError
@@ -152,6 +153,43 @@ def test_arrays_of_any_shape_broadcast_and_become_the_axes_of_a_dataset() -> Non
     shown = found._repr_html_()
     assert found.verdict in shown
     assert "<th>tilt_max</th>" in shown
+
+
+@needs_compiler
+def test_the_index_of_a_table_and_the_dimensions_of_arrays_are_kept() -> None:
+    brief: Any = NATIVE.with_changes(stop_time=0.01)
+    table = pd.DataFrame({X: [0.0, 1.0, 2.0], Y: 0.5})
+    chosen = table[table[X] > 0.0]
+    flown = quadcosim.fly(brief, chosen, outputs=["steps"])
+    assert table.join(flown.to_pandas()["steps"])["steps"].isna().tolist() == [True, False, False]
+    assert flown.to_xarray()["steps"].sel({X: 2.0}).size == 1
+    assert quadcosim.fly(brief, {X: chosen[X], Y: np.zeros((2, 1))}, outputs=["steps"]).axes == {}
+
+    place, width = xr.DataArray([0.0, 1.0], {"side": ["left", "right"]}, "side"), xr.DataArray(np.arange(3.0), dims="w")
+    found = quadcosim.fly(brief, {X: place, Y: width, "seed": width * 0 + place * 0 + 1}, outputs=["steps"])
+    assert (found.shape, found.given["seed"].shape) == ((2, 3), (2, 3))
+    assert found.to_xarray()["steps"].sel(side="left").sizes == {"w": 3}
+
+
+NAMED = xr.DataArray([0.0, 1.0], {"side": ["left", "right"]}, "side")
+OTHERWISE: list[tuple[dict[str, Any], str]] = [
+    ({X: pd.Series([0.0, 1.0]), Y: pd.Series([0.0, 1.0], [1, 0])}, rf"^values of {Y}: index has other labels than bef"),
+    (
+        {X: NAMED, Y: NAMED[::-1]},
+        rf"^values of {Y}: side has other labels than before; expected the same for all, in th",
+    ),
+    ({X: NAMED, Y: xr.DataArray([0.0] * 3, dims="side")}, rf"^values of {Y}: side: 3 values; expected 2 as before$"),
+    (
+        {X: NAMED, Y: NAMED.rename(side="w"), "seed": [0, 1]},
+        "^values of seed: an array; expected one of xarray with di",
+    ),
+]
+
+
+@pytest.mark.parametrize(("values", "message"), OTHERWISE, ids=["index", "labels", "length", "no_names"])
+def test_labels_that_contradict_each_other_are_refused(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(QuadcosimError, match=message):
+        quadcosim.fly(SHORT, values)
 
 
 @needs_compiler
