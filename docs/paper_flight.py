@@ -11,7 +11,7 @@ from orchestration.quadrotor.flight.errors import ERRORS, Error, cut, draw_compo
 from orchestration.quadrotor.flight.path import draw_in_space
 from orchestration.quadrotor.scenarios.measures import position_error
 from orchestration.simulation.figures.drawn_run import DrawnRun
-from orchestration.simulation.figures.lines import TIME
+from orchestration.simulation.figures.lines import label_time
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.runs.draw import runs_of
 from orchestration.simulation.runs.result import Result
@@ -35,7 +35,8 @@ def figure_3(result: Result, style: Style) -> Figure:
         draw_components(panel, shown, error, style, clips=False)
         panel.set_ylabel(panel.get_ylabel().replace("angular velocity", "ang. velocity"))
     panels[0].legend(loc="upper right", ncols=3)
-    panels[-1].set_xlabel(f"{TIME}; flat from there to {run.span[1]:g} s")
+    label_time(panels[-1])
+    panels[-1].set_xlabel(f"{panels[-1].get_xlabel()}; flat from there to {run.span[1]:g} s")
     right.align_ylabels(panels)
     return figure
 

@@ -12,9 +12,9 @@ from orchestration.quadrotor.scenarios.measures import saturated
 from orchestration.quadrotor.scenarios.wiring import COMMAND
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window, title
 from orchestration.simulation.figures.lines import (
-    TIME,
     clip_peaks,
     draw_line,
+    label_time,
     legend_of_runs,
     logarithmic,
     name_runs,
@@ -53,7 +53,7 @@ def commands(runs: Sequence[DrawnRun], style: Style) -> Figure:
         if len(spans) > 1 and window is not None:
             row[0].axvspan(*zoom, color=GREY, alpha=0.15, linewidth=0.0)
     for panel in rows[-1]:
-        panel.set_xlabel(TIME)
+        label_time(panel, end)
     if style.has_titles:
         rows[0][0].set_title(title(runs))
         if len(spans) > 1:

@@ -103,7 +103,7 @@ def _overlaid(runs: Sequence[DrawnRun], style: Style) -> Figure:
             lines.set_time_axis(panel, runs)
             panel.set_ylabel(lines.wrapped(labels.with_unit(f"{error.name} {'xyz'[k]}", error.unit), 18))
             if i == len(available) - 1:
-                panel.set_xlabel(lines.TIME)
+                lines.label_time(panel)
     lines.legend_of_runs(figure, runs, style)
     return figure
 
@@ -118,7 +118,7 @@ def _panels(runs: Sequence[DrawnRun], style: Style) -> tuple[Figure, list[tuple[
     for panel in panels[len(available) :]:
         panel.set_visible(False)
     for panel in panels[max(0, len(available) - columns) : len(available)]:
-        panel.set_xlabel(lines.TIME)
+        lines.label_time(panel, max(run.span[1] for run in runs))
     lines.name_runs(figure, runs, style)
     return figure, list(zip(panels, available))
 

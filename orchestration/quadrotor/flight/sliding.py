@@ -12,7 +12,7 @@ from orchestration.foundation.basics.times import instants_of
 from orchestration.quadrotor.scenarios.wiring import ENERGY, SURFACE, components
 from orchestration.simulation.figures.drawn_run import DrawnRun, title
 from orchestration.simulation.figures.lines import (
-    TIME,
+    label_time,
     legend_of_runs,
     logarithmic,
     name_runs,
@@ -103,8 +103,9 @@ def energy(runs: Sequence[DrawnRun], style: Style) -> Figure | None:
         panel.plot(run.time[at], positive(run[COLUMN][at]), color=run.color, linestyle=run.dashes, label=run.name)
     unit = with_energy[0].described[COLUMN].unit
     logarithmic(panel)
-    panel.set(xlabel=TIME, ylabel=labels.with_unit("energy L", unit))
+    panel.set_ylabel(labels.with_unit("energy L", unit))
     set_time_axis(panel, runs)
+    label_time(panel)
     if style.has_titles:
         panel.set_title(title(runs))
     legend_of_runs(figure, runs, style)

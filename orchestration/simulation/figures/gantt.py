@@ -15,6 +15,7 @@ from orchestration.foundation.basics.times import NANOSECONDS, seconds
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window
 from orchestration.simulation.figures.palette import BLACK, BLUE, BROWN, GREEN, GREY, ORANGE, PURPLE, RED, SKY
 from orchestration.simulation.figures.style import Style
+from orchestration.simulation.results.quantities import quantity
 from orchestration.systems.computers import timeline
 from orchestration.systems.schedule.resources import timeline_of
 
@@ -24,7 +25,6 @@ BAR, LATE = 0.62, 0.16
 """Heights in a row of bars for running and for waiting"""
 COLORS = (BLUE, GREEN, ORANGE, PURPLE, SKY, BROWN)
 """Colours of tasks and messages; a context switch is grey, a missed deadline or an error red"""
-_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,18 +55,18 @@ def draw(timeline: timeline.Timeline, style: Style, window: Window | None = None
     shown = window or default_window(timeline)
     panels = {name: rows for name, rows in _panels(timeline).items() if rows}
     heights = [len(rows) for rows in panels.values()]
-    size, unit = next(each for each in _UNITS if shown[1] - shown[0] >= 2.0 * each[0] or each[1] == "ns")
+    time = quantity("time", "s", shown)
     figure = style.figure(5.0 + sum(2.0 * height + 2.2 for height in heights), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=[h + 0.6 for h in heights])
     for panel, (name, rows) in zip(axes[:, 0], panels.items(), strict=True):
         for place, row in enumerate(rows):
-            _draw_row(panel, row, place, shown, size, style)
+            _draw_row(panel, row, place, shown, time.factor, style)
         panel.set_title(name, loc="left", fontsize=style.font)
-        panel.set(ylim=(len(rows) - 0.35, -0.85), xlim=(shown[0] / size, shown[1] / size))
+        panel.set(ylim=(len(rows) - 0.35, -0.85), xlim=(time.factor * shown[0], time.factor * shown[1]))
         panel.set_yticks(range(len(rows)), [row.name for row in rows])
         panel.tick_params(axis="y", length=0)
         panel.grid(axis="y", visible=False)
-    axes[-1, 0].set_xlabel(f"time [{unit}]")
+    axes[-1, 0].set_xlabel(time.title)
     figure.legend(handles=_legend(panels), loc="outside lower center", ncols=7 if style.is_wide else 3)
     return figure
 
@@ -91,8 +91,8 @@ def _panels(timeline: timeline.Timeline) -> dict[str, list[_Row]]:
     return panels
 
 
-def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, size: float, style: Style) -> None:
-    scale = seconds(1) / size
+def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, factor: float, style: Style) -> None:
+    scale = seconds(1) * factor
     of, slices = row.of, row.slices
     first, last = shown[0] * NANOSECONDS, shown[1] * NANOSECONDS
     waits = _released(of)

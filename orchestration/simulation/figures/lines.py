@@ -19,11 +19,10 @@ from orchestration.simulation.figures.palette import BLACK, GREY
 from orchestration.simulation.figures.shades import CLIPPED, OUTSIDE
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
+from orchestration.simulation.results.quantities import Quantity, quantity
 
 Lines: TypeAlias = Sequence[tuple[Floats, Floats]]
 """Times [s] and values, shape (n,) each"""
-
-TIME = "time [s]"
 
 
 def draw_line(axes: Axes, t: Floats, values: Floats, **how: Any) -> None:
@@ -72,6 +71,22 @@ def set_span(axes: Axes, span: Window) -> None:
     """Set the limits of the time axis to a span, unless it is that of a run of one row."""
     if span[0] < span[1]:
         axes.set_xlim(span)
+
+
+def label_time(axes: Axes, end: float | None = None) -> None:
+    """Name the time axis, and give its numbers the prefix of a time, by default of the end of the axis [s]."""
+    time = _time_on(axes, end)
+    axes.set_xlabel(time.title)
+    _prefix_times(axes, time)
+
+
+def _time_on(axes: Axes, end: float | None = None) -> Quantity:
+    return quantity("time", "s", (axes.get_xlim()[1] if end is None else end,))
+
+
+def _prefix_times(axes: Axes, time: Quantity) -> None:
+    if time.factor != 1.0:
+        axes.xaxis.set_major_formatter(lambda t, _: f"{time.factor * t:g}")
 
 
 def legend_of_runs(figure: Figure, runs: Sequence[DrawnRun], style: Style, of: str | None = None) -> None:
@@ -125,7 +140,8 @@ def clip_peaks(axes: Axes, lines: Lines, unit: str, style: Style, beside: Window
     axes.set_ylim(seen[0] - 0.05 * (seen[1] - seen[0]), seen[1] + over * (seen[1] - seen[0]))
     t, y = max(lines, key=lambda line: float(np.nanmax(np.abs(line[1]))))
     k = int(np.nanargmax(np.abs(y)))
-    note = f"clipped: peak {labels.amount(float(y[k]), unit)} at {t[k]:.3g} s".replace("-", "−")
+    at = _time_on(axes).text_of(float(t[k]), 3)
+    note = f"clipped: peak {labels.amount(float(y[k]), unit)} at {at}".replace("-", "−")
     if is_beside:
         how: Any = {"transform": axes.transAxes, "ha": "right", "va": "top"}
         axes.text(0.98, 0.96, note, fontsize=0.8 * style.font, color=BLACK, **how)
@@ -161,6 +177,7 @@ def _inset(axes: Axes, lines: Lines, outside: Floats, note: str, style: Style) -
             linewidth=0.8 * style.line, drawstyle=drawn.get_drawstyle(),
         )  # fmt: skip
     inset.set_xlim(start, end)
+    _prefix_times(inset, _time_on(axes))
     inset.tick_params(labelsize=0.7 * style.font, length=0.2 * style.font, pad=0.15 * style.font)
     inset.locator_params(nbins=4)
     inset.set_in_layout(False)  # it lies inside

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.drawn_run import DrawnRun
-from orchestration.simulation.figures.lines import TIME, abreast, draw_line, name_runs, set_time_axis, wrapped
+from orchestration.simulation.figures.lines import abreast, draw_line, label_time, name_runs, set_time_axis, wrapped
 from orchestration.simulation.figures.palette import CYCLE, DASHES, MAX_LINES, MAX_PANELS
 from orchestration.simulation.figures.style import Style
 from orchestration.simulation.results import display_names as labels
@@ -49,7 +49,7 @@ def _in_panels(available: Sequence[Panel], runs: Sequence[DrawnRun], style: Styl
         set_time_axis(panel, runs)
         handles, names = panel.get_legend_handles_labels()
         panel.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=abreast(names, style))
-    panels[-1].set_xlabel(TIME)
+    label_time(panels[-1])
     if left_out := sum(len(columns) for _, _, columns in available[MAX_PANELS:]):
         figure.supxlabel(f"and {left_out} more signals")
     name_runs(figure, runs, style)

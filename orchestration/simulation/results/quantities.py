@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import PREFIXES
 from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.requirements import is_number
-
-LONG = 1.0
-"""Time below which times are shown in milliseconds, if all are shorter [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,11 +37,12 @@ class Quantity:
 
 
 def quantity(name: str, unit: str | None, values: Iterable[Any]) -> Quantity:
-    """A quantity with these values in `unit`; times that are all below a second are shown in milliseconds."""
+    """A quantity with these values in `unit`; times have the prefix of the largest, as milliseconds below a second."""
     sizes = [abs(value) for value in values if is_number(value)]
-    if unit == "s" and sizes and max(sizes) < LONG:
-        return Quantity(name=name, unit="ms", factor=1e3)
-    return Quantity(name=name, unit=unit)
+    if unit != "s" or not sizes:
+        return Quantity(name=name, unit=unit)
+    prefix, size = next((pair for pair in PREFIXES if max(sizes) >= pair[1]), PREFIXES[-1 if max(sizes) else 1])
+    return Quantity(name=name, unit=f"{prefix}s", factor=float(round(1.0 / size)))
 
 
 def setting(path: str, values: Iterable[Any], unit: str | None = None) -> Quantity:

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.figures.lines import label_time
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal
@@ -116,7 +117,8 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
             label=signal(loop.output, {}),
         )  # fmt: skip
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
-    axes.set(xlabel="time [s]", ylabel="taken back of a step of 1", xlim=(0.0, result.times[-1]))
+    axes.set(ylabel="taken back of a step of 1", xlim=(0.0, result.times[-1]))
+    label_time(axes)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 

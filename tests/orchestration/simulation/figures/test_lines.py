@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestration.simulation.figures import lines
-from orchestration.simulation.figures.lines import name_runs, visible_rows
+from orchestration.simulation.figures.lines import label_time, name_runs, set_span, visible_rows
 from orchestration.simulation.figures.style import SCREEN
 
 COLUMNS, ROWS = 100, 20_000
@@ -32,6 +32,19 @@ def test_a_column_of_pixels_has_the_first_last_lowest_and_highest_of_its_rows_an
 
 def test_a_short_line_has_all_its_rows() -> None:
     assert visible_rows(np.arange(9.0), np.zeros(9), 3).tolist() == [*range(9)]
+
+
+@pytest.mark.parametrize(
+    ("last", "title", "numbers"),
+    [(2.0, "time [s]", ["0", "2"]), (0.02, "time [ms]", ["0", "20"]), (5e-5, "time [µs]", ["0", "50"])],
+)
+def test_a_short_run_has_its_times_in_small_units(last: float, title: str, numbers: list[str]) -> None:
+    axes = SCREEN.figure(20.0).add_subplot()
+    set_span(axes, (0.0, last))
+    label_time(axes)
+    axes.set_xticks([0.0, last])
+    assert axes.get_xlabel() == title
+    assert [label.get_text() for label in axes.get_xticklabels()] == numbers
 
 
 def test_the_title_of_several_runs_is_that_of_their_legend(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,14 +14,15 @@ from orchestration.simulation.results.quantities import is_in_seconds, quantity,
         ([0.0, 0.01], "ms", "10 ms"),
         ([], "s", "0.01 s"),
         ([None, "none", True, 0.01], "ms", "10 ms"),
+        ([0.0], "ms", "10 ms"),
+        ([0.0, 0.99e-3], "µs", "10000 µs"),
+        ([-2e-7], "ns", "1e+07 ns"),
     ],
 )
-def test_times_are_in_milliseconds_where_all_of_them_are_below_a_second(
-    values: list[object], unit: str, text: str
-) -> None:
+def test_times_have_the_prefix_of_the_largest(values: list[object], unit: str, text: str) -> None:
     found = quantity("period", "s", values)
     assert (found.title, found.text_of(0.01)) == (f"period [{unit}]", text)
-    assert found.of([0.01, 0.5]).tolist() == ([10.0, 500.0] if unit == "ms" else [0.01, 0.5])
+    assert found.of([0.01, 0.5]).tolist() == [0.01 * found.factor, 0.5 * found.factor]
 
 
 def test_nothing_but_a_time_is_in_thousandths() -> None:
