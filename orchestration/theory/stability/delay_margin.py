@@ -111,8 +111,10 @@ class LateCommand:
     i: int
     frequencies: Floats
     late: Late
-    known: dict[float, tuple[Linearised, Complexes]] = field(default_factory=dict)
-    """Loop and sensitivity of the command over its samples, by the part of a sample by which it is late"""
+    known: dict[float, Linearised] = field(default_factory=dict)
+    """The loop, by the part of a sample by which the command is late"""
+    soon: dict[float, Complexes] = field(default_factory=dict)
+    """The sensitivity of that command over its samples"""
 
     @property
     def sides(self) -> list[float]:
@@ -123,7 +125,7 @@ class LateCommand:
     def growth(self, delay: float) -> float:
         """The growth rate of small deviations [1/s]."""
         whole, part = self._split(delay)
-        found = radius(_with_samples(self._late_by(part)[0], self.i, whole))
+        found = radius(_with_samples(self._late_by(part), self.i, whole))
         return math.log(max(found, np.finfo(float).tiny)) / self.loop.rest.dt
 
     def next(self, delay: float, most: float) -> float:
@@ -150,13 +152,13 @@ class LateCommand:
     def ends_stability(self, part: float) -> bool:
         """Whether enough whole samples beside a part of one make the loop unstable: its gain is somewhere above 1."""
         samples = self.loop.samples
-        gains = np.linalg.inv(self._late_by(_rounded(part))[1]) - np.eye(samples)
+        gains = np.linalg.inv(self._soon(_rounded(part))) - np.eye(samples)
         each = (np.linalg.eigvals(gains @ self._shift(whole)) for whole in range(samples))
         return any(bool(np.abs(values).max() > 1.0) for values in each)
 
     def _sensitivity(self, delay: float) -> Complexes:
         whole, part = self._split(delay)
-        soon = self._late_by(part)[1]
+        soon = self._soon(part)
         return np.asarray(np.linalg.solve(soon + (np.eye(self.loop.samples) - soon) @ self._shift(whole), soon))
 
     def _shift(self, whole: int) -> Complexes:
@@ -169,11 +171,15 @@ class LateCommand:
             found[:, sample, place] = z**periods
         return found
 
-    def _late_by(self, part: float) -> tuple[Linearised, Complexes]:
+    def _late_by(self, part: float) -> Linearised:
         if part not in self.known:
-            loop = _with(self.loop, self.i, self.late.rest(part)) if part else self.loop
-            self.known[part] = loop, sensitivity_of(loop, self.i, self.frequencies)
+            self.known[part] = _with(self.loop, self.i, self.late.rest(part)) if part else self.loop
         return self.known[part]
+
+    def _soon(self, part: float) -> Complexes:
+        if part not in self.soon:
+            self.soon[part] = sensitivity_of(self._late_by(part), self.i, self.frequencies)
+        return self.soon[part]
 
     def _split(self, delay: float) -> tuple[int, float]:
         """Whole samples, and the part of one [s]."""

@@ -1,11 +1,9 @@
 """Loops in the frequency domain: each command's loop, the others closed, with its margins as a sampled loop."""
 
 import math
-from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import islice
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -24,7 +22,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.delay_margin import Late, delay_margin, jumps_of
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin, radius_with
+from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.linearise import (
     NEAR_ONE,
     Linearised,
@@ -37,10 +35,9 @@ from orchestration.theory.stability.linearise import (
     stability_of,
 )
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
-from orchestration.theory.stability.loop_halves import closed, loop_gains, radius
+from orchestration.theory.stability.loop_halves import closed, radius
 from orchestration.theory.stability.operating_point import deterministic
 from orchestration.theory.stability.poles import Complexes
-from orchestration.theory.stability.sign_changes import root, sign_changes
 from orchestration.theory.stability.state_space import StateSpace
 
 if TYPE_CHECKING:
@@ -55,8 +52,6 @@ BESIDE_A_POLE = np.linspace(-4.0, 4.0, 17)
 """Further frequencies about that of a pole, in units of its damping"""
 BESIDE_A_TURN = 1e-4
 """Least distance of a frequency from whole turns in a period of several samples"""
-PROVED = 1e-3
-"""Relative distance from a gain margin at which the loop is stable on one side and unstable on the other"""
 
 
 @passable
@@ -218,13 +213,11 @@ def _bode(request: Request, component: str | None) -> Bode:
             late = Late(rest=later, jumps=jumps_of(rest.simulation.system, name))
             expect_decided(loop)
             frequencies, stable = _frequencies(loop), loop.radius < 1.0
-            if loop.samples == 1:
-                gains = loop_gains(loop, frequencies)
-                each = (_margins(loop, i, frequencies, gains[i], late, system) for i in _commands(loop))
-            else:
-                curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
-                gains = np.array([curve for curve, _ in curves])
-                each = (_lifted_margins(loop, i, frequencies, curves[i][1], late, system) for i in _commands(loop))
+            curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
+            gains = np.array([curve for curve, _ in curves])
+            half = math.pi / loop.rest.dt  # of the period: beyond are the same gains
+            below = np.append(frequencies[frequencies < half], half)
+            each = (_margins(loop, i, below, curves[i][1], late, system) for i in _commands(loop))
             found = list[LoopMargins]()
             for margins in each if stable else ():
                 found.append(margins)
@@ -259,92 +252,26 @@ def _output(loop: Linearised, i: int) -> str:
     return f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}"
 
 
-def _lifted_margins(
-    loop: Linearised, i: int, frequencies: Floats, peak: float, late: Late, system: System
-) -> LoopMargins:
+def _margins(loop: Linearised, i: int, frequencies: Floats, peak: float, late: Late, system: System) -> LoopMargins:
     """The margins of a command at all of its samples in a period."""
-    output = _output(loop, i)
-    turn, crossover = phase_margin(loop, i) or (None, None)
-    factors = tuple(GainMargin(factor=factor, frequency=at) for factor, at in gain_margins(loop, i))
-    delay, why = _delay_margin(loop, i, frequencies, late)
+    output, reason, delay = _output(loop, i), "", None
+    turn, crossover = phase_margin(loop, i, frequencies) or (None, None)
+    factors = tuple(GainMargin(factor=factor, frequency=at) for factor, at in gain_margins(loop, i, frequencies))
+    try:
+        delay = delay_margin(loop, i, frequencies, late)
+    except UsageError as error:
+        reason = str(error)
     return LoopMargins(
         input=receivers_of(system, output),
         output=output,
-        gain_margin=min((one.factor for one in factors), key=_away_from_one, default=None),
+        gain_margin=min((one.factor for one in factors), key=lambda one: abs(math.log(one)), default=None),
         gain_margins=factors,
         phase_margin=None if turn is None else math.degrees(turn),
         delay_margin=delay,
-        delay_reason=why,
+        delay_reason=reason,
         crossover=crossover,
         sensitivity_peak=peak,
     )
-
-
-def _margins(loop: Linearised, i: int, frequencies: Floats, gain: Complexes, late: Late, system: System) -> LoopMargins:
-    def gain_at(frequency: float) -> complex:
-        return complex(loop_gains(loop, np.array([frequency]))[i, 0])
-
-    output = _output(loop, i)
-    gain_margins = tuple(_gain_margins(loop, i, frequencies, gain, gain_at))
-    crossings = [root(lambda w: abs(gain_at(w)) - 1.0, *ends) for ends in sign_changes(frequencies, np.abs(gain) - 1.0)]
-    phases = {w: _phase_margin(gain_at(w)) for w in crossings}
-    crossover = min(phases, key=lambda w: abs(phases[w]), default=None)
-    delay, why = _delay_margin(loop, i, frequencies, late)
-    return LoopMargins(
-        input=receivers_of(system, output),
-        output=output,
-        gain_margin=min((one.factor for one in gain_margins), key=_away_from_one, default=None),
-        gain_margins=gain_margins,
-        phase_margin=None if crossover is None else math.degrees(phases[crossover]),
-        delay_margin=delay,
-        delay_reason=why,
-        crossover=crossover,
-        sensitivity_peak=float(np.abs(1.0 / (1.0 + gain)).max()),
-    )
-
-
-def _delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> tuple[float | None, str]:
-    """The delay margin, and why it is not known."""
-    half = math.pi / loop.rest.dt  # the rest are those of other samples
-    try:
-        return delay_margin(loop, i, np.append(frequencies[frequencies < half], half), late), ""
-    except UsageError as error:
-        return None, str(error)
-
-
-def _phase_margin(gain: complex) -> float:
-    """The angle from -1 to a gain, within half a turn [rad]."""
-    return float(np.angle(-gain))
-
-
-def _gain_margins(
-    loop: Linearised, i: int, frequencies: Floats, gain: Complexes, gain_at: Callable[[float], complex]
-) -> Iterator[GainMargin]:
-    """The factors nearest to 1, below and above, beyond which the loop is unstable, as its eigenvalues confirm."""
-    ends = [w for w in (0.0, math.pi / loop.rest.dt) if _is_finite_at(loop, w)]
-    inner = [root(lambda w: gain_at(w).imag, *pair) for pair in sign_changes(frequencies, gain.imag)]
-    found = [GainMargin(factor=-1.0 / gain_at(w).real, frequency=w) for w in [*ends, *inner] if gain_at(w).real < 0.0]
-    nearest = sorted(found, key=lambda one: _away_from_one(one.factor))
-    for side in (-1.0, 1.0):
-        of_side = (one for one in nearest if side * (one.factor - 1.0) > 0.0)
-        yield from islice((one for one in of_side if _ends_stability(loop, i, one.factor)), 1)
-
-
-def _ends_stability(loop: Linearised, i: int, factor: float) -> bool:
-    """Whether the loop is stable with a factor on one command that is a little nearer to 1, and not beyond."""
-    away = math.copysign(PROVED, factor - 1.0)
-    return radius_with(loop, i, factor * (1.0 - away)) < 1.0 <= radius_with(loop, i, factor * (1.0 + away))
-
-
-def _away_from_one(factor: float) -> float:
-    return abs(math.log(factor))
-
-
-def _is_finite_at(loop: Linearised, frequency: float) -> bool:
-    """Whether neither half has a pole at a frequency."""
-    z = np.exp(1j * frequency * loop.rest.dt)
-    poles = np.concatenate([np.linalg.eigvals(half.A) for half in (loop.rest, loop.component)])
-    return not len(poles) or float(np.abs(poles - z).min()) > np.sqrt(NEAR_ONE)
 
 
 def _frequencies(loop: Linearised) -> Floats:

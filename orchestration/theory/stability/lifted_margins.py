@@ -1,24 +1,30 @@
-"""Margins of a loop whose rates meet in a period: of the command at all of its samples, by the poles of the whole.
+"""Margins of a command at all of its samples in a period, by the gains of its loop with the others closed.
 
-A command has N samples in a period, and its loop N gains at each frequency, the eigenvalues of a matrix. Where samples
-do not differ they are the gain of the one loop at frequencies that are whole numbers of turns in a period apart: so
-each belongs to the frequency that its eigenvector has most of, up to half the sampling rate of the command.
+A command has N samples in a period, and its loop N gains at each frequency, the eigenvalues of a matrix: a factor on
+the command, or a turn of it, makes the loop unstable where it brings one of them to -1. Where samples do not differ
+they are the gain of the one loop at frequencies that are whole numbers of turns in a period apart: so each belongs to
+the frequency that its eigenvector has most of, up to half the sampling rate of the command.
 """
 
 import math
+from collections.abc import Callable, Iterator
+from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.stability.linearise import NEAR_ONE, Linearised
-from orchestration.theory.stability.loop_halves import closed, places, radius, sensitivity_of
+from orchestration.theory.stability.linearise import Linearised
+from orchestration.theory.stability.loop_halves import places, radius, sensitivity_of
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.sign_changes import root
 
-FACTORS = np.geomspace(1.0, 1e4, 401)[1:]
-"""Factors on a command that are tried, and their inverses"""
-TURNS = np.linspace(0.0, math.pi, 361)[1:]
-"""Turns of the phase of a command that are tried [rad]"""
+LEAST = 1e-6
+"""Least factor that is a gain margin, and the inverse of the largest"""
+PROVED = 1e-3
+"""Relative distance from a gain margin at which the loop is stable on one side and unstable on the other"""
+PASSED = 1e-6
+"""Size of a part of a sensitivity that counts as 0"""
 
 
 def lifted_gains(loop: Linearised, i: int, frequencies: Floats) -> tuple[Complexes, float]:
@@ -35,54 +41,88 @@ def lifted_gains(loop: Linearised, i: int, frequencies: Floats) -> tuple[Complex
     return np.asarray(1.0 / of_chosen - 1.0, dtype=complex), float(np.linalg.norm(sensitivity, 2, axis=(1, 2)).max())
 
 
-def gain_margins(loop: Linearised, i: int) -> list[tuple[float, float]]:
+def gain_margins(loop: Linearised, i: int, frequencies: Floats) -> list[tuple[float, float]]:
     """The nearest factors below and above 1 on all samples of a command beyond which the loop is unstable.
 
-    Each with its frequency [rad/s]; a missing one: none is known.
+    Each with its frequency [rad/s]; a missing one: none is known. `frequencies` go up to half the rate of the period.
     """
-    found = []
-    for factors in (1.0 / FACTORS, FACTORS):
-        before = 1.0
-        for factor in map(float, factors):
-            if radius_with(loop, i, factor) > 1.0 + NEAR_ONE:
-                at = root(lambda value: radius_with(loop, i, value) - 1.0, before, factor)
-                found.append((at, abs(_frequency_of(loop, i, at))))
-                break
-            before = factor
-    return found
+    ends = ((w, s) for w in (0.0, math.pi / loop.rest.dt) for s in _sensitivities(loop, i, w) if abs(s.imag) < PASSED)
+    found = [((s / (s - 1.0)).real, w, s) for w, s in [*ends, *_passing(loop, i, frequencies, np.imag)] if _counts(s)]
+    nearest = sorted((one for one in found if one[0] > 0.0), key=lambda one: abs(math.log(one[0])))
+    margins = list[tuple[float, float]]()
+    for side in (-1.0, 1.0):
+        of_side = (one for one in nearest if side * (one[0] - 1.0) > 0.0)
+        for factor, w, s in islice((one for one in of_side if _ends_stability(loop, i, one[0])), 1):
+            margins.append((factor, abs(_frequency_of(loop, i, w, s))))
+    return margins
 
 
-def phase_margin(loop: Linearised, i: int) -> tuple[float, float] | None:
+def phase_margin(loop: Linearised, i: int, frequencies: Floats) -> tuple[float, float] | None:
     """The least turn of the phase of a command at which the loop becomes unstable [rad], and the frequency [rad/s].
 
-    Negative: it is ahead. None: no turn makes it unstable.
+    Negative: it is ahead. None: no turn makes it unstable. `frequencies` go up to half the rate of the period.
     """
-    for turn in TURNS:
-        if radius_with(loop, i, np.exp(-1j * turn)) > 1.0 + NEAR_ONE:
-            at = root(lambda value: radius_with(loop, i, np.exp(-1j * value)) - 1.0, turn - TURNS[0], turn)
-            frequency = _frequency_of(loop, i, np.exp(-1j * at))
-            return math.copysign(at, frequency), abs(frequency)
-    return None
+    found = [(float(np.angle(1.0 - 1.0 / s)), w, s) for w, s in _passing(loop, i, frequencies, lambda s: s.real - 0.5)]
+    if not found:
+        return None
+    turn, w, s = min(found, key=lambda one: abs(one[0]))
+    frequency = _frequency_of(loop, i, w, s)
+    return math.copysign(1.0, frequency) * turn, abs(frequency)
 
 
-def radius_with(loop: Linearised, i: int, factor: complex) -> float:
-    """The spectral radius with a factor on all samples of a command."""
-    return radius(loop, _factors(loop, i, factor))
+def _passing(
+    loop: Linearised, i: int, frequencies: Floats, part: Callable[[Any], Any]
+) -> Iterator[tuple[float, complex]]:
+    """Frequencies at which a part of a sensitivity, an eigenvalue over all samples, passes 0, with that sensitivity."""
+    values = np.linalg.eigvals(sensitivity_of(loop, i, frequencies))
+    before, after = values[:-1], values[1:]
+    nearest = np.abs(after[:, None, :] - before[:, :, None]).argmin(axis=2)
+    after = np.take_along_axis(after, nearest, axis=1)
+    for place, which in zip(*np.nonzero((part(before) * part(after) < 0.0) & _counts(before))):
+        course = before[place, which], after[place, which]
+        w, sensitivity = _followed(loop, i, frequencies[place : place + 2], course, part)
+        if abs(part(sensitivity)) < PASSED:
+            yield w, sensitivity
 
 
-def _factors(loop: Linearised, i: int, factor: complex) -> Complexes:
-    factors = np.ones(len(loop.component.outputs), dtype=complex)
+def _followed(
+    loop: Linearised, i: int, ends: Floats, course: tuple[complex, complex], part: Callable[[Any], Any]
+) -> tuple[float, complex]:
+    """Where a part of a sensitivity passes 0 on its course between two frequencies."""
+
+    def at(w: float) -> complex:
+        values, share = _sensitivities(loop, i, w), (w - ends[0]) / (ends[1] - ends[0])
+        return complex(values[np.abs(values - (1.0 - share) * course[0] - share * course[1]).argmin()])
+
+    w = root(lambda w: part(at(w)), *map(float, ends))
+    return w, at(w)
+
+
+def _counts(sensitivity: Any) -> Any:
+    """Whether the factor that takes its gain to -1 is no smaller than `LEAST`, and no larger than the inverse."""
+    return (np.abs(sensitivity) > LEAST) & (np.abs(sensitivity - 1.0) > LEAST)
+
+
+def _sensitivities(loop: Linearised, i: int, frequency: float) -> Complexes:
+    return np.asarray(np.linalg.eigvals(sensitivity_of(loop, i, np.array([frequency]))[0]))
+
+
+def _ends_stability(loop: Linearised, i: int, factor: float) -> bool:
+    """Whether the loop is stable with a factor on one command that is a little nearer to 1, and not beyond."""
+    away = math.copysign(PROVED, factor - 1.0)
+    return _radius_with(loop, i, factor * (1.0 - away)) < 1.0 <= _radius_with(loop, i, factor * (1.0 + away))
+
+
+def _radius_with(loop: Linearised, i: int, factor: float) -> float:
+    factors = np.ones(len(loop.component.outputs))
     factors[places(loop, i)] = factor
-    return factors.real if factor.imag == 0.0 else factors
+    return radius(loop, factors)
 
 
-def _frequency_of(loop: Linearised, i: int, factor: complex) -> float:
-    """The frequency [rad/s] of the motion that decays least, of a command with a factor."""
-    whole = closed(loop, _factors(loop, i, factor))
-    poles, vectors = np.linalg.eig(whole.A)
-    least = int(np.abs(poles).argmax())
-    command = (whole.commands @ vectors[:, least])[places(loop, i)]
-    turns = np.arange(loop.samples) - loop.samples // 2
-    at = (np.angle(poles[least]) + 2.0 * math.pi * turns) / loop.rest.dt
+def _frequency_of(loop: Linearised, i: int, w: float, sensitivity: complex) -> float:
+    """That of which a command has most [rad/s], with whole turns in a period, negative if it turns backward."""
+    values, vectors = np.linalg.eig(sensitivity_of(loop, i, np.array([w]))[0])
+    command = vectors[:, np.abs(values - sensitivity).argmin()]
+    at = w + 2.0 * math.pi / loop.rest.dt * (np.arange(loop.samples) - loop.samples // 2)
     content = np.abs(np.exp(-1j * np.outer(at, np.arange(loop.samples)) * loop.dt) @ command)
     return float(at[content.argmax()])

@@ -8,7 +8,6 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.theory.stability.linearise import Linearised
 from orchestration.theory.stability.poles import Complexes
-from orchestration.theory.stability.state_space import StateSpace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +46,6 @@ def with_rest(loop: Linearised, A: Floats, B: Floats, C: Floats, D: Floats) -> L
     return replace(loop, rest=replace(loop.rest, A=A, B=B, C=C, D=D))
 
 
-def response(of: StateSpace, z: Complexes) -> Complexes:
-    """The transfer function at some z, shape (n, outputs, inputs)."""
-    if not len(of.A):
-        return np.tile(of.D.astype(complex), (len(z), 1, 1))
-    states = np.linalg.solve(z[:, None, None] * np.eye(len(of.A)) - of.A, of.B.astype(complex)[None])
-    return np.asarray(of.C @ states + of.D, dtype=complex)
-
-
 def places(loop: Linearised, i: int) -> Integers:
     """The places of a command at its samples, among those of all."""
     count = len(loop.component.outputs) // loop.samples
@@ -67,25 +58,3 @@ def sensitivity_of(loop: Linearised, i: int, frequencies: Floats) -> Complexes:
     added = whole.steps[:, own].astype(complex)
     states = np.linalg.solve(z[:, None, None] * np.eye(len(whole.A)) - whole.A, added[None])
     return np.asarray(np.eye(len(own)) + whole.direct[np.ix_(own, own)] + whole.commands[own] @ states)
-
-
-def loop_gains(
-    loop: Linearised, frequencies: Floats, only: int | None = None, late: StateSpace | None = None
-) -> Complexes:
-    """The gain of the loop of each command with the others closed, shape (commands, n).
-
-    The command `only` reaches the rest of the loop as it reaches `late`.
-    """
-    z = np.exp(1j * frequencies * loop.rest.dt)
-    rest, law = response(loop.rest, z), response(loop.component, z)
-    if late is not None:
-        rest[:, :, only] = response(late, z)[:, :, only]
-    back = -law @ rest
-    count = back.shape[1]
-    gains = np.empty((count, len(z)), dtype=complex)
-    for i in range(count):
-        others = [j for j in range(count) if j != i]
-        closed = np.eye(len(others)) + back[:, others][:, :, others]
-        through = np.linalg.solve(closed, back[:, others][:, :, [i]])
-        gains[i] = (back[:, [i], i] - (back[:, [i]][:, :, others] @ through)[:, :, 0])[:, 0]
-    return gains

@@ -2,10 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
-from orchestration.foundation.basics.simulator import Floats
-
 HALVINGS = 60
 ZERO = 1e-7
 """Size of a value, as the distance of a spectral radius from 1, that counts as 0"""
@@ -13,13 +9,6 @@ TRIALS = 80
 """Most points that are tried"""
 SECANTS = 12
 """Points from which on a range is only halved, as it is where the function jumps"""
-
-
-def sign_changes(frequencies: Floats, values: Floats) -> list[tuple[float, float]]:
-    """Neighbouring frequencies between which a value changes its sign."""
-    signs = np.sign(values)
-    places = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
-    return [(float(frequencies[place]), float(frequencies[place + 1])) for place in places]
 
 
 def root(of: Callable[[float], float], low: float, high: float) -> float:

@@ -16,8 +16,8 @@ from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
 from orchestration.theory.stability.delay_margin import Late, LateCommand, delay_margin, jumps_of
 from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
-from orchestration.theory.stability.lifted_margins import lifted_gains
-from orchestration.theory.stability.loop_halves import closed, loop_gains
+from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
+from orchestration.theory.stability.loop_halves import closed, sensitivity_of
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import example
@@ -193,7 +193,7 @@ def test_a_loop_of_one_command_has_the_others_closed() -> None:
         return np.asarray(of.C @ np.linalg.solve(z * np.eye(len(of.A)) - of.A, of.B) + of.D)
 
     sensitivity = np.diag(np.linalg.inv(np.eye(3) - at(loop.component) @ at(loop.rest)))
-    assert 1.0 / (1.0 + loop_gains(loop, np.array([7.0]))[:, 0]) == pytest.approx(sensitivity, rel=1e-9)
+    assert [sensitivity_of(loop, i, np.array([7.0])).item() for i in range(3)] == pytest.approx(sensitivity, rel=1e-9)
 
 
 def test_beside_whole_turns_in_a_period_of_five_samples_gains_and_sensitivity_are_those_of_one() -> None:
@@ -231,6 +231,18 @@ def test_beside_whole_turns_in_a_period_of_five_samples_gains_and_sensitivity_ar
     assert found == pytest.approx(gain(beside), rel=1e-9)
     everywhere = np.add.outer(beside, turn * np.arange(samples)).ravel()
     assert peak == pytest.approx(np.abs(1.0 / (1.0 + gain(everywhere))).max(), rel=1e-9)
+    (below, _), (above, at) = gain_margins(loop, 0, np.linspace(1.0, 0.5 * turn, 200))
+    phase, crossover = phase_margin(loop, 0, np.linspace(1.0, 0.5 * turn, 200)) or (0.0, 0.0)
+    assert at > 0.5 * turn
+    assert gain(np.array([at]))[0] * above == pytest.approx(-1.0, abs=1e-6)
+    assert np.exp(-1j * phase) * gain(np.array([crossover]))[0] == pytest.approx(-1.0, abs=1e-6)
+
+    def radius(factor: complex) -> float:
+        return float(np.abs(np.linalg.eigvals(A - factor * B @ gains)).max())
+
+    assert max(radius(below * 1.001), radius(above * 0.999)) < 1.0 < min(radius(below * 0.999), radius(above * 1.001))
+    turned = np.linspace(-phase, phase, 101)[1:-1]
+    assert max(radius(np.exp(1j * one)) for one in turned) < 1.0 < radius(np.exp(-1.001j * phase))
 
 
 def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
