@@ -116,8 +116,7 @@ def laws_of(table: "pd.DataFrame", by: Sequence[str]) -> TwoLaws | None:
 def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "pd.DataFrame":
     """The second law minus the first, by the values of the other axes: `difference`, `low` and `high`.
 
-    The interval is of pairs: of runs with the same value of the axis that repeats, as the same seed. The columns `law`
-    and `minus` have the laws.
+    The interval is of pairs: of runs with the same value of the axis that repeats, as the same seed.
     """
     import pandas as pd
 
@@ -129,9 +128,9 @@ def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "
         one, other = ({name: row[name + end] for name in ("share", "low", "high")} for end in ("", ".other"))
         correlation = correlations.get(tuple(row[name] for name in others), 0.0)
         low, high = interval_of_difference(one, other, correlation=correlation)
-        key = {"law": second, "minus": first, **{name: row[name] for name in others}}
+        key = {name: row[name] for name in others}
         rows.append({**key, "difference": one["share"] - other["share"], "low": low, "high": high})
-    return pd.DataFrame(rows, columns=["law", "minus", *others, "difference", "low", "high"])
+    return pd.DataFrame(rows, columns=[*others, "difference", "low", "high"])
 
 
 def _correlations(table: "pd.DataFrame", others: list[str], laws: TwoLaws) -> dict[tuple[Any, ...], float]:

@@ -131,6 +131,8 @@ def export(
     has a structure `runs` with a field for each column, and `units` with the same fields. Warns of runs by several
     engines.
     """
+    import pandas as pd
+
     rows = frame(path) if rows is None else rows
     if note := note_in(rows):
         warn(note)
@@ -139,7 +141,8 @@ def export(
         cells, repeated = study.cell_names, with_chance(rows, study)
         tables["shares"] = shares_of(repeated, cells)
         if (laws := laws_of(rows, cells)) is not None:
-            tables["differences"] = differences_of(repeated, cells, laws)
+            found = differences_of(repeated, cells, laws)
+            tables["differences"] = pd.DataFrame({"law": laws.second, "minus": laws.first, **found})
     written = []
     with new_files(folder) as new:
         for name, content in tables.items():
