@@ -12,10 +12,11 @@ import numpy as np
 from fmpy.util import auto_interval
 
 from orchestration.components.fmi.access import SCHEDULED, Access, Interface, Solver
+from orchestration.components.fmi.instance import convert_value
 from orchestration.components.fmi.read_description import Model, called, declared_of, read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
 from orchestration.simulation.engines.resolved import table_of
-from orchestration.systems.signals.table_file import TIME, header_of, read_rows
+from orchestration.systems.signals.table_file import TIME, header_of, read_rows, words_of
 from orchestration.systems.system.component import Component, Parameter, Sampling
 from orchestration.systems.system.connection import Source, variable_of
 from orchestration.systems.system.model import System
@@ -241,7 +242,18 @@ def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, S
 
 def _expect_numbers_of_type(model: Model, inputs: Path, columns: Mapping[str, str]) -> None:
     """Raise `UsageError` for a number that its input does not have, or that may not be the one in the file."""
+    for name, column in columns.items():
+        if model.variables[name].choices:
+            for line, word in words_of(inputs, column):
+                place = f"{inputs}: line {line}: {column}"
+                number = convert_value(model.variables[name], word, place)
+                raise UsageError(f"{place} = {word}: expected the number of the item, {number}")
     rows = read_rows(inputs, (TIME, *columns.values()))
+    for extra in rows.columns.keys() - {TIME, *columns.values()}:
+        whole = extra.rpartition("[")[0]
+        raise rows.error(
+            0, extra, f"{sum(model.variables[each].whole == whole for each in columns)} numbers of {whole}"
+        )
     for name, column in columns.items():
         variable, values = model.variables[name], rows.columns[column]
         if variable.kind == "Boolean" and ((values != 0.0) & (values != 1.0)).any():
@@ -249,7 +261,8 @@ def _expect_numbers_of_type(model: Model, inputs: Path, columns: Mapping[str, st
             raise rows.error(at, column, "0 or 1, or false or true: it is a Boolean")
         if variable.kind in ("Integer", "Enumeration") and (values % 1.0).any():
             raise rows.error(int((values % 1.0 != 0.0).argmax()), column, f"a whole number: it is an {variable.type}")
-        beyond = np.abs(values) >= 2.0**53
-        if variable.type in ("Int64", "UInt64") and beyond.any():
-            place = f"{inputs}: line {rows.lines[int(beyond.argmax())]}: {column}"
-            raise UsageError(f"{place}: expected a whole number that a float holds: below 2**53")
+        if variable.kind == "Integer":
+            for at in (i for each, i in rows.rounded if each == column):
+                raise rows.error(at, column, "a whole number that a float holds: all are up to 2**53")
+            for at in (int(values.argmin()), int(values.argmax())):
+                convert_value(variable, float(values[at]), f"{inputs}: line {rows.lines[at]}: {column}")

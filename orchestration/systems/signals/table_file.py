@@ -7,6 +7,7 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -29,10 +30,12 @@ class TableRows:
     columns: Mapping[str, Floats]
     """Columns (n,) by name, in the order of the file"""
     lines: Sequence[int]
+    rounded: Mapping[tuple[str, int], str]
+    """Texts of the large numbers that no float is, by column and row"""
 
     def error(self, row: int, column: str, expected: str) -> UsageError:
         """The error for an invalid value."""
-        value = shown(float(self.columns[column][row]))
+        value = shown(self.rounded.get((column, row), float(self.columns[column][row])))
         return UsageError(f"{self.path}: line {self.lines[row]}: {column} = {value}: expected {expected}")
 
     def expect_increasing_times(self, *, jumps: bool = False) -> None:
@@ -48,6 +51,8 @@ class TableRows:
 
 
 TIME = "time"
+EXACT = 2.0**53
+"""Up to here a float represents every integer"""
 
 
 def read_table(
@@ -81,10 +86,22 @@ def read_rows(path: Path, columns: Sequence[str]) -> TableRows:
         return _read_rows(path, lines, columns)
 
 
+def words_of(path: Path, column: str) -> Iterator[tuple[int, str]]:
+    """The lines and the cells of a column of a CSV file that are no numbers."""
+    with _opened(path) as lines:
+        at = _names(lines).index(column)
+        for cells in lines:
+            if at < len(cells) and not _is_finite(cells[at]):
+                yield lines.line_num, cells[at].strip()
+
+
 def header_of(path: Path) -> list[str]:
     """The names of the columns of a CSV file; raises `UsageError` for one that cannot be read."""
     with _opened(path) as lines:
-        return _names(lines)
+        header = _names(lines)
+    if TIME not in header:
+        _expect_commas(path, header)
+    return header
 
 
 @contextmanager
@@ -111,8 +128,8 @@ def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
     names = _names(lines)
     first: list[str] = next(filter(None, lines), [])
     header = _elements(names, first)
-    _expect_columns(path, header, columns)
-    numbers, places = array("d"), []
+    _expect_columns(path, header, columns, dict(zip(names, first)), lines.line_num)
+    numbers, places, rounded = array("d"), list[int](), dict[tuple[str, int], str]()
     for cells in itertools.chain([first], lines):
         if not cells:
             continue
@@ -124,13 +141,19 @@ def _read_rows(path: Path, lines: Any, columns: Sequence[str]) -> TableRows:
             numbers.extend(map(_number, row))
         except ValueError as error:
             raise UsageError(f"{place}: {_first_invalid(header, row)}: expected numbers only") from error
-        if not all(map(math.isfinite, numbers[-len(header) :])):
+        read = numbers[-len(header) :]
+        if not all(map(math.isfinite, read)):
             raise UsageError(f"{place}: {_first_invalid(header, row)}: expected finite numbers only")
+        if max(read) >= EXACT or min(read) <= -EXACT:
+            for name, number, text in zip(header, read, row):
+                if abs(number) >= EXACT and Decimal(text) != Decimal(number):
+                    rounded[name, len(places)] = text
         places.append(lines.line_num)
     if len(places) < 2:
         raise UsageError(f"{path}: expected at least two rows of numbers")
     table = np.array(numbers).reshape(-1, len(header))
-    return TableRows(path=path, columns={name: table[:, i].copy() for i, name in enumerate(header)}, lines=places)
+    named = {name: table[:, i].copy() for i, name in enumerate(header)}
+    return TableRows(path=path, columns=named, lines=places, rounded=rounded)
 
 
 def _elements(names: list[str], row: Sequence[str]) -> list[str]:
@@ -145,14 +168,26 @@ def _elements(names: list[str], row: Sequence[str]) -> list[str]:
     ]
 
 
-def _expect_columns(path: Path, header: Sequence[str], columns: Sequence[str]) -> None:
+def _expect_columns(
+    path: Path, header: Sequence[str], columns: Sequence[str], first: Mapping[str, str], line: int
+) -> None:
+    """Raise `UsageError` for a missing column, with the cell of the `first` row if that has too few or many numbers."""
     missing = [name for name in columns if name not in header]
     if not missing:
         return
+    _expect_commas(path, header)
+    for name, cell in first.items():
+        elements = [each for each in columns if each.rpartition("[")[0] == name]
+        if name in missing or set(elements) & set(missing):
+            counted = f"{len(elements)} numbers" if elements else "one number"
+            raise UsageError(f"{path}: line {line}: {name} = {shown(cell)}: expected {counted}")
+    raise UsageError(f"{path}: no column {', '.join(missing)}; expected {', '.join(columns)}")
+
+
+def _expect_commas(path: Path, header: Sequence[str]) -> None:
     for separator, mark in ((";", "semicolons"), ("\t", "tabulators")):
         if any(separator in name for name in header):
             raise UsageError(f"{path}: columns separated by {mark}; expected commas, and points in numbers")
-    raise UsageError(f"{path}: no column {', '.join(missing)}; expected {', '.join(columns)}")
 
 
 def _first_invalid(header: Sequence[str], row: Sequence[str]) -> str:

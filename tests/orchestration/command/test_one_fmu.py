@@ -178,7 +178,12 @@ def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_fr
     assert f"big = {2**63}: expected a whole number of 64 bits" in refused
     inputs.write_text(f"time,big\n0,1\n1,{2**53 + 1}\n")
     refused = main("run", fmu, "--in-process", "--inputs", inputs, code=2).stderr
-    assert "big.csv: line 3: big: expected a whole number that a float holds" in refused
+    assert f"big.csv: line 3: big = {2**53 + 1}: expected a whole number that a float holds" in refused
+    inputs.write_text(f"time,big\n0,1\n1,{2**63 - 1}\n")
+    refused = main("run", fmu, "--in-process", "--inputs", inputs, code=2).stderr
+    assert f"big.csv: line 3: big = {2**63 - 1}: expected a whole number that a float holds" in refused
+    inputs.write_text(f"time,big\n0,{-(2**63)}\n1,{2**62}\n")
+    main("run", fmu, "--in-process", "--inputs", inputs, "--stop-time", "1")
 
 
 @needs_compiler
@@ -187,15 +192,33 @@ def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_fr
     [
         ("time,on,small\n0,True,1\n1,0,2.7\n", "line 3: small = 2.7: expected a whole number: it is an Int8"),
         ("time,on\n0,true\n1,.5\n", "line 3: on = 0.5: expected 0 or 1, or false or true: it is a Boolean"),
-        ("time\n0\n1\n", "feeds no input; expected time and columns of its inputs, u[1], u[2], on, small"),
-        ("", "feeds no input; expected time and columns of its inputs, u[1], u[2], on, small"),
-        ("time,label\n0,a\n1,b\n", "label is a String: a file feeds numbers only, to u[1], u[2], on, small"),
+        ("time\n0\n1\n", "feeds no input; expected time and columns of its inputs, u[1], u[2], on, small, way"),
+        ("", "feeds no input; expected time and columns of its inputs, u[1], u[2], on, small, way"),
+        ("time,label\n0,a\n1,b\n", "label is a String: a file feeds numbers only, to u[1], u[2], on, small, way"),
         ("time,on\n0,yes\n1,no\n", "line 2: on = yes: expected numbers only"),
+        ("time,small\n0,1\n1,300\n", "line 3: small = 300: expected a whole number of 8 bits"),
+        ("time,u\n0,1 2 3\n1,1 2 3\n", "line 2: u[3] = 3.0: expected 2 numbers of u"),
+        ("time,u\n0,1\n1,2\n", "line 2: u = 1: expected 2 numbers"),
+        ("time,way\n0,1\n1,backward\n", "line 3: way = backward: expected the number of the item, 2"),
+        ("time;on\n0;1\n", "columns separated by semicolons; expected commas, and points in numbers"),
     ],
-    ids=["whole", "boolean", "only time", "empty", "text", "word"],
+    ids=[
+        "whole",
+        "boolean",
+        "only time",
+        "empty",
+        "text",
+        "word",
+        "range",
+        "too many",
+        "too few",
+        "item",
+        "semicolons",
+    ],
 )
 def test_a_table_that_does_not_fit_the_inputs_is_refused(main: Main, here: Path, table: str, refusal: str) -> None:
     more = '<Int8 name="small" valueReference="9" causality="input" start="0"/>'
+    more += '<Enumeration name="way" declaredType="Mode" valueReference="11" causality="input" start="1"/>'
     more += '<String name="label" valueReference="10" causality="input"><Start value=""/></String>'
     fmu, inputs = known(small(here, fmi=3, more=more)), here / "table.csv"
     inputs.write_text(table)
