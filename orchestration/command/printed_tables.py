@@ -7,6 +7,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 from orchestration.command.options import option
@@ -14,9 +15,9 @@ from orchestration.foundation.basics.errors import UsageError
 
 FORMATS = ("csv", "markdown", "latex")
 MAX_ROWS = 40
-"""Most rows of a table in LaTeX that stands on one page"""
+"""Most rows of a table in LaTeX, as fit on one page"""
 LONG = 12
-"""Most letters of a name in the first column of a table in LaTeX; a longer one stands above its rows"""
+"""Most letters of a name in a leading column of a table in LaTeX; a longer one stands above its rows"""
 WIDE = 68
 """Most letters of a row of a table in LaTeX in `footnotesize`, as the page of an article is wide"""
 TABLE = option("--table", "Print the cells with their intervals as a table of that format.", "|".join(FORMATS))
@@ -57,43 +58,35 @@ def lines(table: PrintedTable, form: str) -> Iterator[str]:
 
 
 def _latex_lines(table: PrintedTable) -> Iterator[str]:
-    blocks = _blocks(table)
-    heads, rows = table.heads, table.rows
-    if blocks:  # the first column stands above its rows
-        heads, rows = heads[1:], [row[1:] for row in rows]
-    columns, head = "l" * len(heads), _latex_head(heads, rows)
-    size = rf"\{_size(heads, rows)}\setlength{{\tabcolsep}}{{4pt}}"
-    body = [_latex_row(row) for row in rows]
-    for place, name in reversed(blocks):
-        rule = [r"\midrule"] if place else []
-        body[place:place] = [*rule, rf"\multicolumn{{{len(heads)}}}{{l}}{{{_latex(name)}}} \\*"]
-    if len(table.rows) <= MAX_ROWS:
-        yield r"\begin{table}  % needs \usepackage{booktabs}"
+    """As wide as the page, in one column or two; more than `MAX_ROWS` rows in several tables with one number."""
+    count = _leading(table)  # columns that stand above their rows
+    heads, rows = table.heads[count:], [row[count:] for row in table.rows]
+    head, size = _latex_head(heads, rows), rf"\{_size(heads, rows)}\setlength{{\tabcolsep}}{{4pt}}"
+    for start in range(0, max(1, len(rows)), MAX_ROWS):
+        yield r"\begin{table*}  % needs \usepackage{booktabs}"
         yield rf"\centering{size}"
-        yield rf"\caption{{{_latex(table.caption)}}}"
-        yield rf"\begin{{tabular}}{{{columns}}}"
-        yield from [*head, *(line.replace(r"\\*", r"\\") for line in body)]
-        yield r"\bottomrule"
-        yield r"\end{tabular}"
-        yield r"\end{table}"
-    else:
-        yield rf"{{{size}"
-        yield rf"\begin{{longtable}}{{{columns}}}  % needs \usepackage{{booktabs,longtable}}"
-        yield rf"\caption{{{_latex(table.caption)}}} \\"
-        yield from [*head, r"\endfirsthead", *head, r"\endhead"]
-        yield r"\bottomrule"
-        yield r"\endfoot"
-        yield from body
-        yield r"\end{longtable}}"
+        yield from [rf"\caption{{{_latex(table.caption)}}}"] if start == 0 else _CONTINUED
+        yield from [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", *head]
+        for place in range(start, min(start + MAX_ROWS, len(rows))):
+            names = table.rows[place][:count]
+            if count and (place == start or names != table.rows[place - 1][:count]):
+                yield from [] if place == start else [r"\midrule"]
+                yield rf"\multicolumn{{{len(heads)}}}{{l}}{{{_latex(', '.join(names))}}} \\"
+            yield _latex_cells([_latex(cell) for cell in rows[place]])
+        yield from [r"\bottomrule", r"\end{tabular}", r"\end{table*}"]
 
 
-def _blocks(table: PrintedTable) -> list[tuple[int, str]]:
-    """The first row of each block of rows that have a long name in common in their first column, and that name."""
-    names = [row[0] for row in table.rows]
-    first = [place for place, name in enumerate(names) if place == 0 or name != names[place - 1]]
-    is_long = max(map(len, names), default=0) > LONG
-    is_block = is_long and len(table.heads) > 1 and len({*names}) == len(first) < len(names)
-    return [(place, names[place]) for place in first] if is_block else []
+_CONTINUED = (r"\addtocounter{table}{-1}", r"\caption{(continued)}")
+
+
+def _leading(table: PrintedTable) -> int:
+    """The number of leading columns, the last of them of long names, that blocks of rows have in common."""
+    for count in range(len(table.heads) - 1, 0, -1):
+        names = [tuple(row[:count]) for row in table.rows]
+        blocks = len([*groupby(names)])
+        if len({*names}) == blocks < len(names) and max(len(name[-1]) for name in names) > LONG:
+            return count
+    return 0
 
 
 def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
@@ -121,10 +114,6 @@ _OF_TEX: Mapping[int, str] = {ord(character): f"\\{character}" for character in 
     ord("\\"): r"\textbackslash{}", ord("~"): r"\textasciitilde{}", ord("^"): r"\textasciicircum{}", ord("<"): "$<$",
     ord(">"): "$>$",
 }  # fmt: skip
-
-
-def _latex_row(row: Sequence[str]) -> str:
-    return _latex_cells([_latex(cell) for cell in row])
 
 
 def _latex_cells(texts: Sequence[str]) -> str:

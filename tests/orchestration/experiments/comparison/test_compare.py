@@ -302,7 +302,7 @@ def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
     ("form", "first", "fourth"),
     [
         ("markdown", "| controller | period [ms] | loss | survives |", "| coupled | 20 | 0.3 | 1.00 [0.34, 1.00] |"),
-        ("latex", r"\begin{table}  % needs \usepackage{booktabs}", r"\begin{tabular}{lllllll}"),
+        ("latex", r"\begin{table*}  % needs \usepackage{booktabs}", r"\begin{tabular}{lllllll}"),
         ("csv", "cell,vehicle,condition,controller,period,loss,count,", "2,base,loss 0,uncoupled,0.02,0.0,2,"),
     ],
 )
