@@ -47,7 +47,9 @@ def gain_margins(loop: Linearised, i: int, frequencies: Floats) -> list[tuple[fl
     Each with its frequency [rad/s]; a missing one: none is known. `frequencies` go up to half the rate of the period.
     """
     ends = ((w, s) for w in (0.0, math.pi / loop.rest.dt) for s in _sensitivities(loop, i, w) if abs(s.imag) < PASSED)
-    found = [((s / (s - 1.0)).real, w, s) for w, s in [*ends, *_passing(loop, i, frequencies, np.imag)] if _counts(s)]
+    found = [
+        (float((s / (s - 1.0)).real), w, s) for w, s in [*ends, *_passing(loop, i, frequencies, np.imag)] if _counts(s)
+    ]
     nearest = sorted((one for one in found if one[0] > 0.0), key=lambda one: abs(math.log(one[0])))
     margins = list[tuple[float, float]]()
     for side in (-1.0, 1.0):
