@@ -42,7 +42,7 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
     values = span.values()
     bracket = ends_of_good(lambda value: above(value) >= 0.0, values, span.own, LIMIT_TOLERANCE * span.tolerance).upper
     if bracket is None:
-        return LinearLimit(reason="second moments are bounded up to the end of the range")
+        return LinearLimit(reason=f"second moments are bounded up to {span.text(values[-1])}, where the scan ends")
     if bracket.good is None:
         return LinearLimit(reason=f"second moments grow without bound at {span.text(values[0])}, where the scan begins")
     good, bad = ((value, above(value)) for value in (bracket.good, bracket.bad))

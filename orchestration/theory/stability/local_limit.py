@@ -226,8 +226,8 @@ def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> Lin
     lower, upper = (None if end is None or end.good is None else 0.5 * (end.good + end.bad) for end in ends)
     reason = ""
     if ends.upper is None:
-        start = "throughout the range" if lower is None else f"from {span.text(lower)} to the end of the range"
-        reason = f"small deviations decay {start}"
+        start, end = span.text(values[0] if lower is None else lower), span.text(values[-1])
+        reason = f"small deviations decay from {start} to {end}, where the scan ends"
     elif upper is None:
         reason = f"small deviations grow at {span.text(values[0])}, where the scan begins"
     return LinearLimit(
