@@ -28,7 +28,8 @@ SAME = 1e-9
 ROUNDING = 1e-11
 """Least effect of rounding on a result, as a share of a response"""
 DIFFERS = 1e-9
-"""Difference allowed of a step of 2h to two of h, of a component that is identified to rounding"""
+"""Difference allowed of a step of 2h to two of h, of a component that is identified to rounding; more where rounding
+of its coordinates decides"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +41,9 @@ class IdentifiedComponent:
     """it is identified"""
     accuracy: float
     """Accuracy of its responses, relative"""
+    precision: float
+    """That of each sample, whose errors add up: of a component that rounds coarsely, or whose coordinates are nearly
+    dependent; 0 of others"""
     tangent: Tangent
     """whose coordinates its state has"""
 
@@ -83,15 +87,22 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
     tangent = of_one_rate(loop.tangent(name))
-    is_linear = tangent.accuracy <= SAME
+    is_linear, precision = tangent.accuracy <= SAME, tangent.precision
     part: Continuous | SampledSystem
     if component.sampling is not None:
         part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
     else:
-        matrices = in_continuous_time(tangent, step, DIFFERS if is_linear else INEXACT, component.step)
+        allowed = INEXACT
+        if is_linear and tangent.rounding <= DIFFERS:
+            allowed = DIFFERS
+        elif is_linear:
+            precision = max(precision, tangent.rounding)
+            allowed = min(tangent.rounding, INEXACT)
+        matrices = in_continuous_time(tangent, step, allowed, component.step)
         part = replace(matrices, step=tangent.derivatives)
     method = "saved states, to rounding" if is_linear else "saved states, by differences"
-    return IdentifiedComponent(part=part, method=method, accuracy=max(ROUNDING, tangent.accuracy), tangent=tangent)
+    accuracy = max(ROUNDING, tangent.accuracy)
+    return IdentifiedComponent(part=part, method=method, accuracy=accuracy, precision=precision, tangent=tangent)
 
 
 def _informative_step(loop: AtRest, name: str) -> float:

@@ -131,12 +131,12 @@ class Loops:
                 initial_state = initial_state_of(initial, loop, parts, tangents, self._instances)
         methods = {name: one.method for name, one in known.items()}
         accuracy = max((one.accuracy for one in known.values()), default=0.0)
-        precision = max((one.tangent.precision for one in known.values()), default=0.0)
+        precision = max((one.precision for one in known.values()), default=0.0)
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
                     f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated, or a "
-                    "component that integrates more accurately"
+                    "component with more internal steps, or a method of higher order"
                 )
         return Linear(
             parts=parts, methods=methods, accuracy=accuracy, precision=precision, objectives=objectives, noise=noise,

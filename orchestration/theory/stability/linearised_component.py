@@ -45,6 +45,8 @@ LINEAR = 1e-6
 """Error allowed of what is predicted at another point of rest or from an initial state, relative to the largest"""
 
 
+ROUNDED = 4.0 * float(np.finfo(float).eps)
+"""Error of rounding of a derivative, relative, per condition number of the coordinates"""
 SIMILAR = 10.0
 """Factor on the accuracy of a component that rounds coarsely, up to which it holds at another point of rest"""
 
@@ -83,6 +85,11 @@ class Tangent(LinearSimulator):
     def precision(self) -> float:
         """The accuracy, relative, of a component that rounds coarsely, at any frequency; 0 of others."""
         return max(self.accuracy, self._spread) if self._excitation.is_coarse else 0.0
+
+    @property
+    def rounding(self) -> float:
+        """The error, relative, that rounding alone may leave in derivatives by nearly dependent coordinates."""
+        return ROUNDED * float(np.linalg.cond(self._inverse)) if len(self._inverse) else 0.0
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""

@@ -1,0 +1,35 @@
+"""Components as matrices: what rounding may do to coordinates that are nearly dependent."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.exact import components
+
+ROUGH = 2e-8
+
+
+def decaying(h: float) -> tuple[Floats, Floats]:
+    """The derivatives of an output and its state, the latter rounded as coarsely as its coordinate is."""
+    after = np.exp(-h) + ROUGH * (-1.0) ** round(h / 0.01)
+    return np.array([[after], [after]]), np.full((2, 1), 1.0 - np.exp(-h))
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-7])
+def test_a_step_differs_from_two_of_half_its_length_by_as_much_as_coordinates_round(
+    rounding: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tangent = SimpleNamespace(
+        inputs=("u",), outputs=("y",), unit=0.01, accuracy=0.0, precision=0.0, rounding=rounding, derivatives=decaying
+    )
+    monkeypatch.setattr(components, "of_one_rate", lambda one: one)
+    fixed = SimpleNamespace(model=SimpleNamespace(varies_step=False))
+    plant = SimpleNamespace(sampling=None, step=0.01)
+    simulation = SimpleNamespace(system=SimpleNamespace(components={"plant": plant}), instances={"plant": fixed})
+    loop: Any = SimpleNamespace(simulation=simulation, tangent=lambda name: tangent)
+    found = components._identified(loop, "plant")
+    assert isinstance(found.part, components.Continuous)
+    assert (found.part.unfit is None, found.precision) == (bool(rounding), rounding)
