@@ -141,9 +141,14 @@ class Declaration(property):
 
         `frame`: the function of `fmu_kit.frames` that converts it to other axes, in a `Framed` slave.
 
-        Raises `ValueError` for an unknown unit, `TypeError` for a start value that no variable can have.
+        Raises `ValueError` for an unknown unit, `TypeError` for one that is no text and for a start value that no
+        variable can have.
         """
         super().__init__()
+        if unit is not None and not isinstance(unit, str):
+            raise TypeError(
+                f'unit = {unit!r}: expected a text, as in {type(self).__name__}({description!r}, "1", {unit!r})'
+            )
         self.description = description
         self.start: Any = float(start) if type(start) is int and unit else start
         self._kind = _kind_of(self.start)

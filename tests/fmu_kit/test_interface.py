@@ -335,3 +335,8 @@ def _named(name: str) -> Declaration:
     declared = Output("taken", "1")
     declared.__set_name__(Slave, name)
     return declared
+
+
+def test_a_start_in_the_place_of_the_unit_is_refused_in_words() -> None:
+    with pytest.raises(TypeError, match=r"^unit = 0.0: expected a text, as in Parameter\('gain', \"1\", 0.0\)$"):
+        Parameter("gain", 0.0)  # type: ignore[arg-type]

@@ -1,5 +1,6 @@
 """A result shows itself, and goes into tables and files of other programs."""
 
+import dataclasses
 import sys
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,25 @@ def test_a_window_without_a_row_is_refused_in_a_line(window: Any, result: Result
 def test_only_results_lie_beside_a_result(beside: Any, result: Result) -> None:
     with pytest.raises(UsageError, match=r"^beside = \[3\]: expected a list of results of runs$"):
         result.plot("errors", beside=beside)
+
+
+def test_a_criterion_of_a_course_is_refused_before_anything_is_flown() -> None:
+    system = Scenario().as_system()
+    judged = dataclasses.replace(system.criterion, good="plant.position.x < 1")
+    with pytest.raises(
+        UsageError, match=r"^criterion.good: plant.position.x has a value at each instant; expected one"
+    ):
+        quadcosim.run(dataclasses.replace(system, criterion=judged, stop_time=0.01))
+
+
+def test_what_keeps_no_run_is_neither_saved_nor_reported(tmp_path: Path) -> None:
+    flights = quadcosim.Flights(arrays={}, given={}, recorded=(), shape=(), engine="batch", reason=None)
+    with pytest.raises(UsageError, match=r"^save_run: <Flights: .*>: expected a Result of run"):
+        quadcosim.save_run(flights, tmp_path / "run")  # type: ignore[arg-type]
+    with pytest.raises(
+        UsageError, match=r"^report: runs of fly: keep no run to be written: expected a Result of run, "
+    ):
+        quadcosim.report(flights, out=tmp_path / "report.html")
 
 
 def test_csv_has_units_in_its_head_and_the_same_numbers(result: Result, tmp_path: Path) -> None:

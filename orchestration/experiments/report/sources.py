@@ -11,6 +11,7 @@ from orchestration.experiments.report.model import Report
 from orchestration.experiments.report.subset import Wanted
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.simulation.runs.flights import NOT_STORED, Flights
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.run_directory import METRICS, load_run
 
@@ -37,6 +38,8 @@ def source_of(what: object, store: Path | None = None, out: Path | None = None) 
 
     `store` is the folder of the store, by default `out` if it is there. Raises `UsageError` for anything else.
     """
+    if isinstance(what, Flights):
+        raise UsageError(f"report: runs of fly: {NOT_STORED}")
     path = Path(what) if isinstance(what, (str, os.PathLike)) else None
     kind = None if path is None else _kind(path)
     if path is not None and kind is not None and kind in ("run", "store"):

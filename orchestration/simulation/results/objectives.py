@@ -220,6 +220,8 @@ def with_available_objectives(system: System, signals: set[str], numbers: set[st
     for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
         if expression is not None:
             expect_names(parse(expression), valid, f"criterion.{place}")
+    if system.criterion.good is not None:
+        expect_number(parse(system.criterion.good), courses, "criterion.good")
     return system if len(available) == len(system.objectives) else replace(system, objectives=available)
 
 

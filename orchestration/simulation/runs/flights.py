@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+NOT_STORED = (
+    "keep no run to be written: expected a Result of run, or what sweep has returned of a Study; their numbers are "
+    "written by to_pandas() or to_xarray()"
+)
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Flights(Mapping[str, Any]):
     """The results of many runs as arrays by name: `flights["position_rmse"]` has a value for each run."""
@@ -60,16 +66,26 @@ class Flights(Mapping[str, Any]):
         outcomes = Counter(np.asarray(self.arrays.get(OUTCOME, ())).ravel().tolist())
         return how_runs_ended(outcomes, int(np.prod(self.shape, dtype=int)))
 
-    def share(self, name: str = "good") -> Estimate:
-        """The share of runs of which an output is true, with Wilson's interval at 95 %.
+    def share(self, name: str = "good", *, axis: Any = None, where: Any = True, confidence: float = 0.95) -> Estimate:
+        """The share of runs of which an output is true, with Wilson's interval, over all axes, or over one or several.
 
-        Raises `UsageError` for an output that is no truth value in each run.
+        Of a part of the axes, numbers are arrays over the others. `where` are truth values that choose runs. Raises
+        `UsageError` for an output that is no truth value in each run, and where no run is chosen.
         """
-        values = self[name]
+        values, chosen = self[name], np.asarray(where)
         if values.dtype != np.bool_:
             raise UsageError(f"share of {name}: expected an output that is true or false in each run, as good")
-        low, high = wilson(int(values.sum()), values.size)
-        return Estimate(value=float(values.mean()), low=low, high=high, confidence=0.95)
+        try:
+            if chosen.dtype != np.bool_:
+                raise ValueError("where are no truth values")
+            chosen = np.broadcast_to(chosen, values.shape)
+            count, true = chosen.sum(axis=axis), (values & chosen).sum(axis=axis)
+        except (TypeError, ValueError) as error:  # NumPy's error of an axis is a ValueError too
+            raise UsageError(f"share of {name}: {error}; expected axes and truth values of {values.shape}") from None
+        bounds = [wilson(int(of), int(all_of), confidence) for of, all_of in zip(true.flat, count.flat)]
+        low, high = (np.reshape(ends, count.shape) for ends in zip(*bounds))
+        as_given: Any = np.asarray if count.shape else float
+        return Estimate(value=as_given(true / count), low=as_given(low), high=as_given(high), confidence=confidence)
 
     def __repr__(self) -> str:
         return f"<Flights: {np.prod(self.shape, dtype=int)} runs by {self.engine}; {', '.join(self.arrays)}>"

@@ -140,7 +140,10 @@ class Result:
 
     def __repr__(self) -> str:
         outcome = self.metrics["outcome"] or "run"
-        return f"<Result: {outcome}, {self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns>"
+        warned = "".join(f"; warning: {text}" for text in self.warnings)
+        return (
+            f"<Result: {outcome}, {self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns{warned}>"
+        )
 
     def _repr_html_(self) -> str:
         """As notebooks show it."""
@@ -155,7 +158,8 @@ class Result:
             f"{self.end:g} s in {len(self.recording)} rows of {len(self.columns)} columns"
             + (f"; diverged: {self.divergence}" if self.divergence else "")
             + (f"; not good: {missed}" if (missed := unmet(self.system, self.metrics, self.units)) else "")
-            + (f"; terminated: {self.termination}" if self.termination else ""),
+            + (f"; terminated: {self.termination}" if self.termination else "")
+            + "".join(f"; warning: {text}" for text in self.warnings),
             [
                 (labels.metric(name), html.number(self.metrics[name]), labels.unit(self.units.get(name)) or "")
                 for name in named

@@ -105,8 +105,10 @@ STATE = "paused.npz"
 def save_run(result: Result, out: str | Path, *, figures: bool = True) -> Path:
     """Write the directory of a run, replacing an earlier run there; returns it.
 
-    Raises `UsageError` if `out` holds something else.
+    Raises `UsageError` if `out` holds something else, and for what is no result.
     """
+    if not isinstance(result, Result):
+        raise UsageError(f"save_run: {shown(repr(result))}: expected a Result of run: others keep no run to be written")
     with run_folder(Path(out), (METRICS,)) as new:
         tables.copy(result.recording, new.path, result.about)
         _write(result, new.path, figures=figures)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.read_description import Model, read_model
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import CountProgress, runs_reporter, warn
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
@@ -35,13 +35,15 @@ from orchestration.simulation.workers.batching import chunks
 from orchestration.simulation.workers.executors import expect_workers, local_workers
 from orchestration.simulation.workers.pool import Inputs
 from orchestration.simulation.workers.task import TaskBatch, of_components, rows_of
+from orchestration.systems.expressions.over_run import vectors
 from orchestration.systems.system.check import check, connect_references, recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.files import files_of, files_read_by, located
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import parameter_name
-from orchestration.systems.system.request import Request, errors_in_own_terms
+from orchestration.systems.system.request import ControlLoop, Request, errors_in_own_terms
 
+IN_PROCESS = "in_process=True"
 _NOTES = logging.getLogger("quadcosim")
 
 
@@ -62,9 +64,9 @@ def fly(
     They broadcast as NumPy's do, those of xarray by the names of their dimensions, and outputs have the shape that they
     have together; with one value for each path that is `()`. `outputs` are names of objectives, or of `outcome`,
     `good`, `horizon` [s], `diverged`, `divergence_time` [s] and `steps`; default: all of them. `metrics` are objectives
-    of your own by name, as expressions of the language of objectives. `record` are columns whose rows are kept, with
-    their `time` [s], along one axis more. Numbers are float64, outcomes words; truth values are booleans, or 0.0 and
-    1.0 where some run has none.
+    of your own by name, as expressions of the language of objectives. `record` are columns, or vectors, whose rows are
+    kept, with their `time` [s], along one axis more. Numbers are float64, outcomes words; truth values are booleans, or
+    0.0 and 1.0 where some run has none.
 
     Native FMUs run in lanes of vector registers where this machine has a C compiler and the FMUs have code for lanes,
     else each run is one of `run`. So it is with FMUs that were not built here from this project's sources, whose runs
@@ -86,11 +88,14 @@ def fly(
         }
         check(system, models)
         system = connect_references(system, models)
+        record = _components_of_vectors(record, system, models)
         fits = check_against_fmus(_recording(system, models, record), models)
         names = _outputs(fits.system, None if outputs is None else names_in(outputs, "outputs"))
         runs = columns(loaded, fits.system, models, values)
-        _warn_of_mismatches(loaded, runs, fits.parameters, models)
+        _warn_of_mistakes(loaded, runs, fits.parameters, models)
         reason = _reason_unavailable(fits.system, models, in_process)
+        if reason and runs.count > 1 and IN_PROCESS in reason:
+            warn(f"{runs.count} runs one by one, each in a process of its own: {reason}")
         table = _Table(runs, names, record)
         if workers > 1:
             rows = _by_workers(runs, fits.parameters, record, workers, in_lanes=reason is None)
@@ -226,6 +231,13 @@ def _with_sources(
     return rows_of(signals, record)
 
 
+def _components_of_vectors(record: Sequence[str], system: System, models: Mapping[str, Model]) -> tuple[str, ...]:
+    """The columns, with .x, .y, .z (and .w) of a vector for its name."""
+    variables = [f"{name}.{variable}" for name, model in models.items() for variable in model.variables]
+    known = vectors(dict.fromkeys((*columns_of(system), *variables)))
+    return tuple(dict.fromkeys(column for name in record for column in known.get(name, (name,))))
+
+
 def _recording(system: System, models: Mapping[str, Model], record: Sequence[str]) -> System:
     """The system, recording these columns too; raises `UsageError` for one that cannot be recorded."""
     known, usual = {"time", *columns_of(system)}, recorded_variables(system, models)
@@ -242,14 +254,28 @@ def _recording(system: System, models: Mapping[str, Model], record: Sequence[str
     return replace(system, components=components)
 
 
-def _warn_of_mismatches(
+def _warn_of_mistakes(
     request: Request, runs: Columns, parameters: Mapping[str, float], models: Mapping[str, Model]
 ) -> None:
-    """Warn, as a run does, of components that do not fit each other, in the first run in which they do not."""
+    """Warn, as a run does, of components that do not fit each other, and of runs too short for their timing.
+
+    In the first run in which it is so.
+    """
     settings = [np.unique(each, return_index=True)[1] for path, each in runs.settings.items() if parameter_name(path)]
+    of_time = {
+        target: np.broadcast_to(each, runs.shape).reshape(-1)
+        for target, each in runs.given.items()
+        if (target.startswith("timing.") or target == "stop_time") and each.dtype.kind in "fiu"
+    }
+    settings += [
+        np.array([each.argmin(), each.argmax()]) for each in of_time.values()
+    ]  # the shortest run has fewest samples
     places = {0, *(int(place) for firsts in settings for place in firsts)}
     for place in sorted(places.union(first_differences(runs.parameters, parameters))):
-        if texts := request.mismatches(numeric_parameters(runs.alone(place), models)):
+        if isinstance(request, ControlLoop) and of_time:
+            with prefixed(f"run {runs.name(place)}: "):
+                request = request.with_values({target: each[place].item() for target, each in of_time.items()})
+        if texts := request.warnings(numeric_parameters(runs.alone(place), models)):
             for text in texts:
                 warn(text)
             return
@@ -269,7 +295,9 @@ def _reason_unavailable(system: System, models: Mapping[str, Model], in_process:
     foreign = [name for name, model in models.items() if not model.is_own]
     if foreign and not in_process:
         listed = ", ".join(f"components.{name}" for name in foreign)
-        return f"{listed}: not built here from quadcosim's own sources: expected in_process=True"
+        return (
+            f"{listed}: not built here from quadcosim's own sources: expected {IN_PROCESS}, to run them in this process"
+        )
     try:
         expect_lanes(system, models)
     except QuadcosimError as error:

@@ -42,8 +42,8 @@ class IdentifiedComponent:
     accuracy: float
     """Accuracy of its responses, relative"""
     precision: float
-    """That of each sample, whose errors add up: of a component that rounds coarsely, or whose coordinates are nearly
-    dependent; 0 of others"""
+    """Accuracy of each sample, whose errors add up, of a component that rounds coarsely, or whose coordinates are
+    nearly dependent; 0 of others"""
     tangent: Tangent
     """whose coordinates its state has"""
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 import quadcosim
 from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.statistics import wilson
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.engines.batch import shape
@@ -194,12 +195,27 @@ def test_labels_that_contradict_each_other_are_refused(values: dict[str, Any], m
 
 @needs_compiler
 def test_runs_share_their_times_as_far_as_they_go_or_have_their_own() -> None:
-    settings: Any = {"outputs": ["steps"], "record": ["plant.position.x"]}
+    settings: Any = {"outputs": ["steps"], "record": ["plant.position"]}
     shorter = quadcosim.fly(SHORT, {"stop_time": [0.1, 0.2, 0.1]}, **settings).to_xarray()
     assert shorter["plant.position.x"].dims == ("stop_time", "time")
     assert shorter["plant.position.x"].count("time").values.tolist() == [101, 201, 101]
     coarser = quadcosim.fly(SHORT, {"timing.plant_interval": [0.001, 0.002]}, **settings).to_xarray()
     assert coarser["plant.position.x"].dims == coarser["time"].dims == ("timing.plant_interval", "row")
+
+
+def test_a_share_is_of_all_runs_of_a_part_of_the_axes_or_of_those_chosen() -> None:
+    good = np.array([[True, False, True], [True, True, True]])
+    flights = quadcosim.Flights(arrays={"good": good}, given={}, recorded=(), shape=(2, 3), engine="batch", reason=None)
+    across = flights.share(axis=1, where=[True, False, True], confidence=0.99)
+    assert np.shape(across.low) == (2,)
+    assert (np.asarray(across.value).tolist(), np.asarray(across.low)[1]) == ([1.0, 1.0], wilson(2, 2, 0.99)[0])
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"axis": 2}, "axis 2 is out of"), ({"where": [1, 2, 3]}, "no truth"), ({"where": [True] * 4}, "broadcast"),
+        ({"where": False}, "0 of 0"), ({"confidence": 99}, "between 0 and 1"),
+    ]  # fmt: skip
+    for arguments, message in wrong:
+        with pytest.raises(QuadcosimError, match=message):
+            flights.share(**arguments)
 
 
 @pytest.mark.parametrize("package", ["pandas", "xarray"])
@@ -211,12 +227,15 @@ def test_without_its_package_a_table_is_refused_in_a_line(package: str, monkeypa
 
 
 @needs_compiler
-def test_foreign_fmus_are_flown_alone_and_named(tmp_path: Path) -> None:
+def test_foreign_fmus_are_flown_alone_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     system = System(stop_time=0.1, components={"one": Component(fmu=str(small(tmp_path)), step=0.01)})
     found = quadcosim.fly(system, {"stop_time": [0.1, 0.2]})
     assert found["horizon"].tolist() == [0.1, 0.2]
     assert found.engine == "compiled"
     assert "components.one: not built here" in str(found.reason)
+    assert capsys.readouterr().err.startswith(
+        f"warning: 2 runs one by one, each in a process of its own: {found.reason}"
+    )
     assert "components.one: small.fmu" in str(quadcosim.fly(system, {"stop_time": [0.1]}, in_process=True).reason)
 
 
@@ -267,6 +286,7 @@ WRONG: list[tuple[Any, dict[str, Any], str]] = [
         r"^outputs: position_rms: did you mean position_rmse\? expected one of",
     ),
     ({X: [0.0]}, {"record": ["plant.positionx"]}, r"record.plant: QuadrotorPlant has no variable positionx"),
+    ({X: [0.0]}, {"record": ["plant.positon"]}, r"record.plant: QuadrotorPlant has no variable positon"),
     ({X: [0.0]}, {"record": ["wing.x"]}, r"^record: wing.x: expected COMPONENT.VARIABLE of plant, controller"),
     ({X: [0.0, 0.0], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run 1: "),
     ({X: [[0.0], [0.0]], "plant.initial.quaternion.w": [1.0, 0.0]}, {}, r"^run \(0, 1\): "),
@@ -289,7 +309,7 @@ def test_what_cannot_be_is_refused_in_a_line(values: dict[str, Any], more: dict[
 
 @needs_compiler
 def test_runs_whose_controller_believes_another_plant_are_warned_of_once(capsys: pytest.CaptureFixture[str]) -> None:
-    brief, masses = NATIVE.with_changes(stop_time=0.01), {"plant.mass": [1.0, 1.1, 1.2]}
+    brief, masses = NATIVE.with_changes(stop_time=0.02), {"plant.mass": [1.0, 1.1, 1.2]}
     quadcosim.fly(brief, masses)
     warned = capsys.readouterr().err
     assert warned.startswith(
@@ -299,6 +319,10 @@ def test_runs_whose_controller_believes_another_plant_are_warned_of_once(capsys:
     quadcosim.fly(brief, {**masses, "controller.mass": masses["plant.mass"]})
     quadcosim.fly(brief.with_changes(model_mismatch=True), masses)
     assert capsys.readouterr().err == ""
+    quadcosim.fly(brief, {"timing.period": [0.01, 30.0, 40.0]})
+    assert capsys.readouterr().err == (
+        "warning: timing.period = 40.0: the run ends at 0.02 s, so the controller samples only once\n"
+    )
 
 
 def test_runs_share_what_they_do_not_have_of_their_own() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.exact import components
+from orchestration.theory.stability.matrices import Continuous
 
 ROUGH = 2e-8
 
@@ -31,5 +32,5 @@ def test_a_step_differs_from_two_of_half_its_length_by_as_much_as_coordinates_ro
     simulation = SimpleNamespace(system=SimpleNamespace(components={"plant": plant}), instances={"plant": fixed})
     loop: Any = SimpleNamespace(simulation=simulation, tangent=lambda name: tangent)
     found = components._identified(loop, "plant")
-    assert isinstance(found.part, components.Continuous)
+    assert isinstance(found.part, Continuous)
     assert (found.part.unfit is None, found.precision) == (bool(rounding), rounding)
