@@ -317,7 +317,9 @@ def read_description(path: Path) -> ModelDescription:
         raise no_utf8(error) from error
     except Exception as error:  # fmpy passes on any exception of the readers of zip and XML
         _expect_version(path)
-        raise UsageError(f"{path}: expected an FMU with a valid modelDescription.xml: {error}") from error
+        what = "its ModelStructure has an index of no variable; quadcosim validate names it"
+        what = what if isinstance(error, IndexError) else str(error)
+        raise UsageError(f"{path}: expected an FMU with a valid modelDescription.xml: {what}") from error
     if description.fmiMajorVersion == 1:
         from orchestration.components.fmi.fmi1_description import completed  # not before: few FMUs are of FMI 1.0
 

@@ -263,7 +263,8 @@ def folder_here(version: int, folders: Sequence[str]) -> str:
     for folder in FOLDERS[version]:
         if folder in folders:
             return folder
-    raise QuadcosimError(f"has no binary for {' or '.join(FOLDERS[version])}, only for {', '.join(folders) or 'none'}")
+    here = f"has no binary for {' or '.join(FOLDERS[version])}"
+    raise QuadcosimError(f"{here}, only for {', '.join(folders)}" if folders else f"{here}, nor for any other platform")
 
 
 def load_slave(

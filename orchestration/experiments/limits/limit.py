@@ -229,7 +229,7 @@ def _note(
     if max(trials.tried) < span.values()[-1]:
         least, most = min(trials.tried), max(trials.tried)
         where = f"from {span.text(least)} to {span.text(most)}" if least < most else f"only {span.text(least)}"
-        parts.append(f"scanned {where}: beyond that nothing is known")
+        parts.append(f"scanned {where}, as a search ends soon after what fails: beyond that nothing is known")
     if found.lower is not None:
         parts.append(f"below {span.text(found.lower)} small deviations grow, too")
     if found.reason:
@@ -246,5 +246,9 @@ def _note(
             "may oscillate, and what is judged is good still",
         ]
     if measured < (1.0 - GAP) * local:
-        return [*parts, f"more than a tenth below the local limit of {span.text(local)}: large signals decide"]
+        return [
+            *parts,
+            f"more than a tenth below the local limit of {span.text(local)}: what is judged fails earlier, by large "
+            "signals or as small ones decay too slowly for the horizon, which a longer --stop-time tells",
+        ]
     return [*parts, f"within a tenth of the local limit of {span.text(local)}"]

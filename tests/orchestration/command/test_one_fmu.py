@@ -225,6 +225,17 @@ def test_a_table_that_does_not_fit_the_inputs_is_refused(main: Main, here: Path,
     assert f"table.csv: {refusal}" in main("run", fmu, "--inputs", inputs, code=2).stderr
 
 
+@needs_compiler
+def test_an_index_of_no_variable_is_named_as_the_fault_of_the_description(
+    main: Main, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fmpy, "read_model_description", lambda *_, **__: [][7])
+    refused = main("run", small(here), code=2).stderr
+    assert (
+        "small.fmu: expected an FMU with a valid modelDescription.xml: its ModelStructure has an index of no" in refused
+    )
+
+
 LINES = "time,u,w\n5,0,0\n5.7,1.4,0\n6,2,0\n6,-1,0\n6.3,0.5,0\n7,4,0\n"
 
 

@@ -513,6 +513,7 @@ def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_noted() -> None:
     found = find(scenario_of(), "period")
     assert found.local_limit == pytest.approx(0.080, abs=0.0005)
     assert "more than a tenth below the local limit" in found.note
+    assert "by large signals or as small ones decay too slowly for the horizon" in found.note
 
 
 def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
@@ -590,7 +591,9 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
         "period good from 6.25 ms up to 31.5 ms; diverges at 31.75 ms; diverges at 6 ms (scan 5 ms, tolerance 0.5 ms)"
     )
     assert (found.large_signal_limit, found.large_signal_lower_limit) == (0.0315, 0.00625)
-    assert "scanned from 5 ms to 55 ms: beyond that nothing is known" in found.note
+    assert (
+        "scanned from 5 ms to 55 ms, as a search ends soon after what fails: beyond that nothing is known" in found.note
+    )
     from_below = find(scenario_of(), "period", first=0.005)
     assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (None, None)
     assert from_below.verdict.startswith("period not good even at 5 ms, where the scan begins: diverged; good again at")
