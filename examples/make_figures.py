@@ -186,7 +186,7 @@ def distributed_servo() -> Figure:
         np.full(3, 6.0), known, "o", color="white", markeredgecolor="black", clip_on=False,
         label="known: 65.5, 86.2, 123.0",
     )  # fmt: skip
-    figure.colorbar(shades, label="J, mean of y² + u² [1]", ticks=levels, format="%g")
+    figure.colorbar(shades, label="J, mean of y² + u²", ticks=levels, format="%g")
     axes.set(xlabel="period [ms]", ylabel="delay [ms]", title="beyond the line the expectation is not finite")
     axes.legend(loc="lower right", frameon=True, framealpha=0.9)
     return figure

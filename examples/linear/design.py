@@ -174,12 +174,10 @@ def bode(sets: Mapping[str, Gains]) -> Figure:
         phases.semilogx(FREQUENCIES, np.degrees(np.unwrap(found.phase.ravel())) - 360.0, dashes, color=color)
     sizes.axhline(1.0, color=GREY, linewidth=0.8)
     phases.axhline(-180.0, color=GREY, linewidth=0.8)
-    sizes.set(
-        ylabel="loop gain |L| [1]", title=f"the torque about y, sampled every {1000 * PERIOD:g} ms: phase margins"
-    )
+    sizes.set(ylabel="loop gain |L|", title=f"the torque about y, sampled every {1000 * PERIOD:g} ms: phase margins")
     phases.set(xlabel="frequency [rad/s]", ylabel="phase of L [°]")
     phases.yaxis.set_major_locator(MultipleLocator(90.0))
-    sizes.legend(loc="lower left")
+    sizes.legend(loc="upper right")
     return figure
 
 

@@ -51,12 +51,10 @@ def components_of_errors(runs: Sequence[DrawnRun], style: Style) -> Figure:
         return _overlaid(runs, style)
     run = cut(runs[0])
     figure, panels = _panels([run], style)
-    if run is not runs[0]:
-        figure.supxlabel(f"flat from there to {runs[0].span[1]:g} s", fontsize="small")
-    for i, (panel, error) in enumerate(panels):
+    for panel, error in panels:
         draw_components(panel, run, error, style)
-        if i == 0:
-            panel.legend(loc="upper right", ncols=3)
+    rest = None if run is runs[0] else f"flat from there to {runs[0].span[1]:g} s"
+    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=3, title=rest)
     return figure
 
 

@@ -269,7 +269,7 @@ def test_errors_that_are_flat_for_four_fifths_are_cut_there_unless_a_window_is_g
     for window, end in ((None, 7.0), ((0.0, 32.0), 32.0)):
         figure = draw(whole, ["components"], window=window)["components"]
         assert {axes.get_xlim() for axes in seen(figure)} == {(0.0, end)}
-        assert ("flat from there to 32 s" in figure.get_supxlabel()) is (window is None)
+        assert ("flat from there to 32 s" in figure.legends[0].get_title().get_text()) is (window is None)
 
 
 def test_a_clipped_peak_is_noted_and_shown_in_an_inset(flight: Result) -> None:
