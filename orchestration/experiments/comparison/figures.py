@@ -107,6 +107,8 @@ class Reach:
 def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style: Style = SCREEN) -> Figure:
     """The limits up to which half and nine in ten survive, and settle, with intervals; arrows reach beyond the axis.
 
+    A limit before its first value is not a mark but "below".
+
     If the axis is `in_seconds`, a third panel has the limits of settling times the bandwidth.
     """
     count = 3 if in_seconds else 2
@@ -126,8 +128,8 @@ def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style:
     titles = [f"survive up to\n{axis.title}", f"settle up to\n{axis.title}"]
     titles += [f"settle: {axis.name} · bandwidth\nof the attitude loop [rad]"] if in_seconds else []
     for panel, title in zip(panels, titles):
-        panel.margins(x=0.08)
-        panel.set_xlabel(title if style.is_wide else title.replace("\n", " "))
+        panel.margins(x=0.15)  # room for arrows
+        panel.set_xlabel(title)
     figure.legend(loc="outside upper center", ncols=2)
     return figure
 
@@ -280,6 +282,12 @@ def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, c
     high = last if limit.high is None else limit.high
     ends = [[factor * (limit.value - limit.low)], [factor * (high - limit.value)]]
     panel.errorbar(factor * limit.value, at, xerr=ends, fmt="o", color=color, markersize=5, capsize=2, label=label)
+    if not limit.value:  # not at the first value of the axis: no limit is known, and none is at 0
+        panel.get_lines()[-3].set_visible(False)
+        panel.annotate(
+            "below", (0.0, at), (2, 0), textcoords="offset points", color=color, va="center", fontsize="x-small",
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        )  # fmt: skip
     if limit.high is None:  # beside the last value, whose own mark stays visible
         panel.annotate(
             "", (factor * high, at), (16, 0), textcoords="offset points",

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import CellSummary, Median, Share
@@ -11,7 +12,7 @@ from orchestration.experiments.comparison.figures import Reach, colors_of, front
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.simulation.figures.names import COLUMNS
-from orchestration.simulation.figures.style import SCREEN, STYLES
+from orchestration.simulation.figures.style import SCREEN, STYLES, Style
 from orchestration.simulation.results.quantities import Quantity
 
 SURVIVORS = {"soon": (20, 3, 0), "later": (20, 14, 0), "never": (20, 20, 20), "nor this": (20, 20, 20)}
@@ -50,19 +51,25 @@ def test_several_panels_have_their_controllers_in_one_legend() -> None:
     assert not any(panel.texts for panel in figure.axes)
 
 
-def test_no_label_of_the_limits_is_cut_off() -> None:
+@pytest.mark.parametrize("style", [SCREEN, replace(STYLES["paper"], width=COLUMNS["single"])], ids=["screen", "single"])
+def test_no_label_of_the_limits_is_cut_off_and_one_before_the_first_value_is_below(style: Style) -> None:
     fates = [
-        GridLimit(vehicle="v", condition="c", controller="a", fate=fate, share="half", value=0.1, low=0.1, high=None,
+        GridLimit(vehicle="v", condition="c", controller="a", fate=fate, share=share, value=value, low=value, high=None,
                   bandwidth=20.0)
-        for fate in ("survive", "settle")
+        for fate in ("survive", "settle") for share, value in (("half", 0.1), ("nine in ten", 0.0))
     ]  # fmt: skip
     reaches = [Reach(name="cascade, no rate derivative", limits=fates, last=0.8)]
-    with SCREEN.applied():
-        figure = limits_of(reaches, Quantity(name="period", unit="ms", factor=1e3), True)
+    with style.applied():
+        figure = limits_of(reaches, Quantity(name="period", unit="ms", factor=1e3), True, style)
         figure.draw_without_rendering()
     for panel in figure.axes:
         label = panel.xaxis.label.get_window_extent()
         assert (label.x0, label.x1) == (max(label.x0, 0.0), min(label.x1, figure.bbox.width)), panel.get_xlabel()
+        arrows = [text.arrow_patch.get_window_extent() for text in panel.texts if text.arrow_patch is not None]
+        assert arrows and all(arrow.x1 < figure.bbox.width for arrow in arrows)
+        assert "below" in [text.get_text() for text in panel.texts]
+        marks = [line for line in panel.get_lines() if line.get_marker() == "o" and line.get_visible()]
+        assert [*map(float, marks[0].get_xdata())] != [0.0] and len(marks) == 1
 
 
 def test_a_point_far_beyond_the_others_is_told_in_words_and_those_left_out_are_counted() -> None:
