@@ -57,7 +57,7 @@ def shares(method: SensitivityMethod, dimension: int, samples: int, seed: int) -
 def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: Floats, metric: str) -> list[Index]:
     """The indices of a metric, whose `values` (n,) belong to the rows of `design` (n, d).
 
-    Raises `UsageError` if a value is missing, of a failed run or a metric that some runs do not have.
+    Raises `UsageError` if a value is missing, of a failed run or a metric that some runs do not have, or all are equal.
     """
     missing = int(np.count_nonzero(~np.isfinite(values)))
     if missing:
@@ -65,6 +65,8 @@ def analyse(method: SensitivityMethod, axes: list[str], design: Floats, values: 
             f"{metric}: {missing} of {len(values)} runs have no value, expected one for each; "
             "a run that diverged has none but its outcome"
         )
+    if (values == values[0]).all():
+        raise UsageError(f"{metric} does not vary over the {len(values)} runs: it has no index; expected one that does")
     problem = _problem(axes)
     if method == "morris":
         from SALib.analyze.morris import analyze as morris
