@@ -159,7 +159,7 @@ def _cell(
     counts = "" if counted is None else "{} of {} {}: ".format(*counted)
     return MapCell(
         x=place[0], y=place[1], value=value, low=None if is_exact else low, high=None if is_exact else high,
-        text=_shown(value, word) if counted is None or is_exact else "{}/{}".format(*counted),
+        text=_shown(value, word) if counted is None else "{}/{}".format(*counted),
         said=f"{counts}{_shown(value, word)}, {exact}", runs=runs,
     )  # fmt: skip
 

@@ -181,10 +181,9 @@ def _write_counts(
     panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], group: "pd.DataFrame"
 ) -> None:
     x, y = (quantity.of(group[axis.name]) for quantity, axis in zip(quantities, axes))
-    for across, up, good, count, share, low in zip(x, y, *(group[name] for name in ("good", "count", "share", "low"))):
+    for across, up, good, count, share in zip(x, y, *(group[name] for name in ("good", "count", "share"))):
         color = "white" if share < HALF else BLACK
-        text = f"{good}/{count}" if np.isfinite(low) else f"{share:g}/1"
-        panel.text(across, up, text, color=color, ha="center", va="center", fontsize="x-small")
+        panel.text(across, up, f"{good}/{count}", color=color, ha="center", va="center", fontsize="x-small")
 
 
 def _difference(
@@ -227,8 +226,9 @@ def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str
 
 def _repetitions(cells: "pd.DataFrame", metric: str) -> str:
     """The number of runs of a cell, and how wide the intervals of their shares are; empty where none repeats."""
-    fewest, most = cells["count"].min(), cells["count"].max()
-    if most == 1:
+    counts = cells["count"][cells["low"].notna()]
+    fewest, most = counts.min(), counts.max()
+    if not most > 1:
         return ""
     runs = f"{fewest}" if fewest == most else f"{fewest} to {most}"
     width = (cells["high"] - cells["low"]).max()

@@ -43,7 +43,7 @@ def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "p
     """A row for each combination of the values of the axes `by` that has finished runs.
 
     The table is one `with_chance`. Columns: those axes, `count` of runs, `good` of them, `share`, its Wilson interval
-    at 95 % `low` and `high`, nan where nothing is random, and `value`: the share, or the median of another `metric`
+    at 95 % `low` and `high`, nan where nothing is random and all are one run, and `value`: the share, or the median of another `metric`
     over the good runs, nan if there are none. Raises `UsageError` if no criterion says what is good.
     """
     import pandas as pd
@@ -64,6 +64,8 @@ def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "p
         wilson(int(good), int(count)) if random else (np.nan, np.nan)
         for good, count, random in zip(cells["good"], cells["count"], cells["random"])
     ]
+    alike = ~cells["random"] & cells["share"].isin((0.0, 1.0))  # one flight, whatever its seeds
+    cells.loc[alike, "good"], cells.loc[alike, "count"] = cells.loc[alike, "share"].astype(int), 1
     cells[["low", "high"]] = pd.DataFrame(intervals, index=cells.index, columns=["low", "high"], dtype=float)
     return cells[[*by, "count", "good", "share", "low", "high", "value"]]
 

@@ -58,7 +58,7 @@ def test_two_laws_have_a_map_each_and_one_of_their_difference() -> None:
     assert lossy.runs == (21, 22, 23)
     assert lossy.said == "0 of 3 settled: 0 %, 95 % interval 0 % to 56 %"
     exact = cell(first, 10.0, 0.0)
-    assert (exact.text, exact.low, exact.said) == ("100 %", None, "3 of 3 settled: 100 %, nothing is random")
+    assert (exact.text, exact.low, exact.said) == ("1/1", None, "1 of 1 settled: 100 %, nothing is random")
     apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(3, 3))
     shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 1.0), ends)]
     assert (apart.low, apart.high) == interval_of_difference(*shares)
