@@ -43,8 +43,9 @@ def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "p
     """A row for each combination of the values of the axes `by` that has finished runs.
 
     The table is one `with_chance`. Columns: those axes, `count` of runs, `good` of them, `share`, its Wilson interval
-    at 95 % `low` and `high`, nan where nothing is random and all are one run, and `value`: the share, or the median of another `metric`
-    over the good runs, nan if there are none. Raises `UsageError` if no criterion says what is good.
+    at 95 % `low` and `high`, and `value`: the share, or the median of another `metric` over the good runs, nan if there
+    are none. A cell where nothing is random is one run, whatever its seeds, and its interval is nan. Raises
+    `UsageError` if no criterion says what is good.
     """
     import pandas as pd
 

@@ -163,7 +163,6 @@ def test_an_outcome_that_does_not_vary_has_no_index(flown: tuple[Study, Path]) -
         draw_study(chosen, folder, "outcome")  # in this short a flight none has settled
 
 
-
 def test_the_outcome_is_one_for_a_good_run_and_missing_for_one_that_failed() -> None:
     runs = pd.DataFrame({"outcome": ["settled", "bounded", "diverged", None], "good": [1.0, 0.0, 0.0, None]})
     assert numbers(runs, "outcome").tolist() == pytest.approx([1.0, 0.0, 0.0, math.nan], nan_ok=True)
