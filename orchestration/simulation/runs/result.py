@@ -102,12 +102,15 @@ class Result:
 
     @property
     def verdict(self) -> str:
-        """How a run ended, by the objective that its criterion judges, and its clock."""
+        """How a run ended, by the objective that its criterion judges, and its clock; none of an FMU alone without."""
         from orchestration.systems.system.description import describe_clock
 
         missed = [f"{name} {count}" for name, count in self.missed_deadlines.items()]
         late = f"; deadlines missed: {some(missed)}" if missed else ""
-        return f"{self._ending()}, {describe_clock(self.system)}{late}"
+        components = self.system.components.values()
+        has_clock = len(components) > 1 or any(each.sampling is not None for each in components)
+        clock = f", {describe_clock(self.system)}" if has_clock else ""
+        return f"{self._ending()}{clock}{late}"
 
     @cached_property
     def missed_deadlines(self) -> dict[str, int]:

@@ -33,9 +33,9 @@ def check(system: System, models: Mapping[str, Model]) -> None:
                 raise UsageError(f"{has_no}; {expected_name(recorded, recordable)}")
             if variable.kind not in NUMERIC:
                 raise UsageError(f"{place}.record: {recorded} is a {variable.kind}: only numbers can be recorded")
-            if variable.causality not in ("output", "local"):
+            if variable.causality not in ("output", "local", "input"):
                 is_other = f"{recorded} is {_with_article(variable)}"
-                raise UsageError(f"{place}.record: {is_other}; expected an output or a local")
+                raise UsageError(f"{place}.record: {is_other}; expected an output, a local or an input")
     for x in system.connections:
         for end_key, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
             model = models[component_of(ends[0])]

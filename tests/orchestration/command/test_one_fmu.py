@@ -59,6 +59,8 @@ def test_types_arrays_and_held_inputs_are_those_of_fmpy(
     how = {"output_interval": 0.125, "stop_time": 1.0, "start_values": {"u": start}}
     assert Path("out.csv").read_text() == by_fmpy(fmu, inputs, **how)
     assert "True" in Path("out.csv").read_text()
+    main("run", fmu, "--in-process", "--inputs", inputs, "--record", "on", *flags)
+    assert Path("out.csv").read_text() == by_fmpy(fmu, inputs, output=["on"], **how), "inputs are recorded, too"
 
 
 def test_without_flags_the_default_experiment_runs_as_in_fmpy(built: dict[str, Path]) -> None:
@@ -129,6 +131,7 @@ def test_a_step_ends_where_an_input_jumps_as_in_fmpy(main: Main, here: Path, fmi
     for interval in (0.1, 0.3):
         ran = main("run", fmu, *flags, "--output-interval", str(interval))
         assert "jumps" not in ran.stderr
+        assert "nothing is sampled" not in ran.stdout
         by_fmpy(fmu, inputs, stop_time=1.0, output_interval=interval)
         one, other = (Path(name).read_text().splitlines() for name in ("out.csv", "by_fmpy.csv"))
         assert one[0] == other[0]

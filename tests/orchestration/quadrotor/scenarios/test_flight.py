@@ -391,7 +391,9 @@ def test_a_value_below_what_the_fmu_declares_is_refused_before_it_is_loaded(side
 def test_a_record_of_what_is_no_variable_is_refused() -> None:
     with pytest.raises(UsageError, match="did you mean tilt"):
         quadcosim.run(native(stop_time=0.05, record=Record(plant=("tild",))))
-    with pytest.raises(UsageError, match=r"^record.plant: mass is a parameter; expected an output or a local$"):
+    with pytest.raises(
+        UsageError, match=r"^record.plant: mass is a parameter; expected an output, a local or an input$"
+    ):
         quadcosim.run(native(stop_time=0.05, record=Record(plant=("mass",))))
 
 
