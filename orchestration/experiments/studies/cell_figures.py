@@ -1,6 +1,6 @@
 """Figures of cells: shares of good runs with their intervals, medians, and the difference between two laws."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,9 +9,16 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
 from orchestration.experiments.studies.axes import SCALES, Axis, Value, edges, name_of, quantity_of
-from orchestration.experiments.studies.shares import GOOD, TwoLaws, cells_of, differences_of
+from orchestration.experiments.studies.shares import (
+    GOOD,
+    TwoLaws,
+    cells_of,
+    differences_of,
+    differences_of_medians,
+)
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
@@ -60,8 +67,7 @@ def cell_lines(
                 )  # fmt: skip
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
-    numbered = "" if metric == GOOD else ", and their number"
-    panel.set(xlabel=across.title, ylabel=_title(metric, words, units) + numbered, xscale=SCALES[axis.scale])
+    panel.set(xlabel=across.title, ylabel=_title(metric, words, units), xscale=SCALES[axis.scale])
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
     if laws is not None:
@@ -84,7 +90,7 @@ def cell_maps(
     """The share of good runs, or the median of a metric, over two axes; the line is where half of the runs are good.
 
     `laws` is an axis of names, such as controllers: a panel for each, and for two of them one of their difference, with
-    dots where the interval of the difference of the shares at 95 % excludes 0.
+    dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs that are both good.
     """
     x, y = (quantity_of(axis, units) for axis in axes)
     places = (edges(axes[0], x.of(table[axes[0].name])), edges(axes[1], y.of(table[axes[1].name])))
@@ -99,31 +105,43 @@ def cell_maps(
         panel.set_visible(False)
     grids = [{name: _grid(group, axes, name) for name in ("value", "share")} for _, group in groups]
     everything = np.stack([grid["value"] for grid in grids])
-    writes = len(places[0]) * columns <= MAX_TEXTS
+    writes, repeats = (len(places[0]) - 1) * columns <= MAX_TEXTS, found["count"].max() > 1
     for panel, (law, group), grid in zip(panels, groups, grids):
         filled = _fill(panel, places, grid["value"], everything, metric)
         mesh.hatch(panel, *places, np.isnan(grid["share"]))
         _limit(panel, places, grid["share"])
         if metric == GOOD and writes:
             _write_counts(panel, (x, y), axes, group)
+        elif writes and repeats:
+            _write_numbers(panel, (x, y), axes, group[group["good"] > 0].set_index(_names(*axes))["good"], 0.0)
         panel.set_title(law or "")
     empty = [np.where(np.isnan(grid["value"]) & ~np.isnan(grid["share"]), 0.0, np.nan) for grid in grids]
     for panel, none_good in zip(panels, empty):
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
     if filled is not None:
-        title = _title(metric, words, units)
+        title = _title(metric, words, units, numbered=writes and repeats)
         figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
     if laws is not None and len(groups) == 2:
         first, second = map(str, laws.values or ())
-        of_pairs = differences_of(table, _names(*axes, laws), TwoLaws(laws.name, first, second))
-        _difference(figure, panels[2], places, groups, grids, axes, (x, y), metric, of_pairs)
+        both, names = TwoLaws(laws.name, first, second), _names(*axes, laws)
+        if metric == GOOD:
+            of_pairs, of = differences_of(table, names, both), "difference of the shares"
+        else:
+            of_pairs = differences_of_medians(table, names, both, metric)
+            of = labels.metric_with_unit(
+                "median difference", units.get(metric) or labels.METRICS.get(metric, ("", None))[1]
+            )
+            of += ", number of pairs" if writes and repeats else ""
+        _difference(figure, panels[2], places, axes, (x, y), of_pairs, of, writes=writes and repeats)
+        panels[2].set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     for panel in panels[:count]:
         panel.set(xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale], xlabel=x.title)
         panel.xaxis.set_tick_params(labelbottom=True)
         mesh.name_cells(panel, *(q.of(sorted(axis.values or ())) for q, axis in zip((x, y), axes)))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
-    dots = "; dots: Newcombe's for pairs excludes 0" if metric == GOOD and len(groups) == 2 else ""
+    excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
+    dots = f"; dots: {excludes} excludes 0" if len(groups) == 2 else ""
     repetitions = _repetitions(found, metric)
     style.set_title(figure, repetitions and repetitions + dots)
     handles: list[Patch | Line2D] = []
@@ -186,42 +204,57 @@ def _write_counts(
         panel.text(across, up, f"{good}/{count}", color=color, ha="center", va="center", fontsize="x-small")
 
 
+def _write_numbers(
+    panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], numbers: "pd.Series", side: float
+) -> None:
+    """Write numbers into the cells with the values of their index, that many points to the left of the middle."""
+    places = zip(*(quantity.of(numbers.index.get_level_values(a.name)) for quantity, a in zip(quantities, axes)))
+    for place, number in zip(places, numbers):
+        panel.annotate(
+            f"{number}", place, (-side, 0.0), textcoords="offset points", ha="right" if side else "center", va="center",
+            fontsize="x-small", path_effects=[withStroke(linewidth=1.5, foreground="white")],
+        )  # fmt: skip
+
+
 def _difference(
     figure: Figure,
     panel: Axes,
     places: tuple[Floats, Floats],
-    groups: "Sequence[tuple[str, pd.DataFrame]]",
-    grids: Sequence[Mapping[str, Floats]],
     axes: tuple[Axis, Axis],
     quantities: tuple[Quantity, Quantity],
-    metric: str,
     found: "pd.DataFrame",
+    of: str,
+    *,
+    writes: bool,
 ) -> None:
-    """The second law minus the first, with dots where the interval of the difference of the shares excludes 0."""
-    difference = grids[1]["value"] - grids[0]["value"]
+    """The second law minus the first, with dots where its interval excludes 0; of medians the numbers of pairs too."""
+    difference, is_share = _grid(found, axes, "difference"), "pairs" not in found
     known = np.abs(difference[np.isfinite(difference)])
-    size = 1.0 if metric == GOOD or not known.max(initial=0.0) else float(known.max())
+    size = 1.0 if is_share or not known.max(initial=0.0) else float(known.max())
     filled = mesh.fill(panel, *places, difference, cmap="RdBu", norm=Normalize(-size, size), vmin=None)
-    of = "difference of the shares" if metric == GOOD else "difference of the medians"
     figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85)
-    panel.set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
-    if metric != GOOD:
-        return
     for row in found.to_dict("records"):  # the sign, which colours do not show in grey
         if row["difference"]:
             x, y = (float(quantity.of(row[axis.name])) for axis, quantity in zip(axes, quantities))
-            color = "white" if abs(row["difference"]) > HALF else BLACK
-            panel.text(x, y, "+" if row["difference"] > 0.0 else "−", color=color, ha="left", va="bottom")
+            color = "white" if abs(row["difference"]) > HALF * size else BLACK
+            panel.annotate(
+                "+" if row["difference"] > 0.0 else "−", (x, y), (3.5, 0.0), textcoords="offset points", color=color,
+                ha="left", va="center",
+            )  # fmt: skip
+    if not is_share and writes:
+        _write_numbers(panel, quantities, axes, found.set_index(_names(*axes))["pairs"], 3.5)
     marked = found[(found["low"] > 0.0) | (found["high"] < 0.0)]
     if len(marked):
         places_of_dots = [quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes)]
         panel.plot(*places_of_dots, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
 
 
-def _title(metric: str, words: tuple[str, str], units: Mapping[str, str]) -> str:
+def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool = True) -> str:
     if metric == GOOD:
         return f"share of {words[0]} runs"
-    return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}"
+    return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}" + (
+        ", and their number" if numbered else ""
+    )
 
 
 def _repetitions(cells: "pd.DataFrame", metric: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.statistics import pair_correlation, wilson
+from orchestration.foundation.basics.statistics import pair_correlation, quantile, wilson
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,6 +134,26 @@ def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "
         key = {name: row[name] for name in others}
         rows.append({**key, "difference": one["share"] - other["share"], "low": low, "high": high})
     return pd.DataFrame(rows, columns=[*others, "difference", "low", "high"])
+
+
+def differences_of_medians(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws, metric: str) -> "pd.DataFrame":
+    """The median of a metric of the second law minus that of the first, over the pairs in which both are good.
+
+    Columns: the other axes, `pairs`, their number, `difference`, and the interval of order statistics at 95 %, `low`
+    and `high`, nan where there are too few pairs, and where nothing is random, which is one pair.
+    """
+    import pandas as pd
+
+    others = [name for name in by if name != laws.axis]
+    good = table[(table["status"] == "done") & table["good"].fillna(False).astype(bool) & table[metric].notna()]
+    columns, rows = [*others, PAIR, metric, RANDOM], []
+    one, other = (good.loc[good[laws.axis] == law, columns] for law in (laws.second, laws.first))
+    for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others):
+        found = quantile((both[metric] - both[f"{metric}.other"]).to_numpy(float))
+        is_random = bool((both[RANDOM] | both[f"{RANDOM}.other"]).any())
+        ends = (end if is_random and math.isfinite(end) else math.nan for end in (found.low, found.high))
+        rows.append((*key, len(both) if is_random else 1, found.value, *ends))
+    return pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high"])
 
 
 def _correlations(table: "pd.DataFrame", others: list[str], laws: TwoLaws) -> dict[tuple[Any, ...], float]:

@@ -20,6 +20,7 @@ from orchestration.experiments.studies.shares import (
     TwoLaws,
     cells_of,
     differences_of,
+    differences_of_medians,
     interval_of_difference,
     with_chance,
 )
@@ -125,6 +126,29 @@ def test_the_interval_of_a_difference_of_two_laws_is_newcombes_for_pairs() -> No
     assert low < found.loc[(0.01, 0.1), "low"] < found.loc[(0.01, 0.1), "high"] < high
     pairless = differences_of(alike.assign(**{PAIR: range(len(alike))}), names, laws).set_index(place)
     assert tuple(pairless.loc[(0.01, 0.1), ["low", "high"]]) == (low, high)
+
+
+def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good() -> None:
+    names, laws = ["controller", "timing.period", "timing.loss"], TwoLaws("controller", *map(str, LAWS.values or ()))
+    table = runs().assign(position_rmse=lambda t: t["seed"] ** 2.0 * (t["controller"] == laws.second) + 5.0 * t["seed"])
+    found = differences_of_medians(table, names, laws, "position_rmse").set_index(["timing.period", "timing.loss"])
+    assert [*found.index] == [(0.01, 0.1), (0.01, 0.2)], "elsewhere none of the second law is good"
+    assert found["pairs"].tolist() == [3, 6]
+    assert found["difference"].tolist() == [1.0, 6.5], (
+        "of seeds 0 to 2 and 0 to 5, whatever the others of the first law"
+    )
+    assert found["low"].isna().tolist() == [True, False], "three pairs do not bound a median"
+    assert tuple(found.loc[(0.01, 0.2), ["low", "high"]]) == (0.0, 25.0)
+    exact = differences_of_medians(table.assign(random=False), names, laws, "position_rmse")
+    assert exact["pairs"].tolist() == [1, 1]
+    assert exact[["low", "high"]].isna().all(axis=None)
+    figure = cell_maps(table.assign(position_rmse=table["position_rmse"] + 1.0 * (table["controller"] == laws.second)),
+                       (PERIODS, LOSSES), LAWS, "position_rmse", WORDS, units={"position_rmse": "m"})  # fmt: skip
+    assert [text.get_text() for text in figure.axes[1].texts] == ["3", "6"]
+    assert [text.get_text() for text in figure.axes[2].texts] == ["+", "+", "3", "6"]
+    assert [bar.get_xlabel() for bar in figure.axes[3:]][1] == "median difference [m], number of pairs"
+    (marks,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
+    assert np.asarray(marks.get_ydata()).tolist() == [0.2], "an interval that excludes 0"
 
 
 def test_a_cell_in_which_nothing_is_random_has_no_interval_and_no_dot() -> None:
@@ -235,6 +259,15 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     drawn = main("draw", "study.toml", "--out", "figures", "--format", "png").stdout.splitlines()
     assert drawn == ["figures/good.png"]
     main("draw", "study.toml", "--store", "results/study/study.sqlite", "--out", "figures", "--format", "png")
+    drawn = main(
+        "draw", "study.toml", "--metric", "position_rmse", "--out", "figures", "--format", "png"
+    ).stdout.split()
+    assert drawn == [
+        "figures/medians_position_rmse.csv", "figures/differences_position_rmse.csv", "figures/position_rmse.png",
+    ]  # fmt: skip
+    medians = pd.read_csv(tmp_path / "figures/medians_position_rmse.csv")
+    assert list(medians)[-2:] == ["median", "unit"]
+    assert set(medians["unit"]) == {"m"}
     main("export", "study.toml", "--format", "csv")
     runs = pd.read_csv(tmp_path / "results/study/runs.csv")
     guids = {
