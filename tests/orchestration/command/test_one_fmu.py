@@ -48,7 +48,9 @@ def test_rows_and_file_are_those_of_fmpy_to_the_bit(main: Main, built: dict[str,
 
 
 @needs_compiler
-@pytest.mark.parametrize(("fmi", "start", "by_element"), [(2, "8", ["u=8"]), (3, "8 0.3", ["u[1]=8", "u[2]=0.3"])])
+@pytest.mark.parametrize(
+    ("fmi", "start", "by_element"), [(2, "8", ["u=8"]), (3, "8 0.3", ["u[1]=8", "u[2]=0.3"]), (3, "8 0.3", ["u=8 0.3"])]
+)
 def test_types_arrays_and_held_inputs_are_those_of_fmpy(
     main: Main, here: Path, fmi: int, start: str, by_element: list[str]
 ) -> None:
@@ -90,6 +92,7 @@ def test_all_commands_set_what_run_sets_and_a_value_that_cannot_be_read_is_named
     (component,) = request_from(fmu, FlightFlags(set=["gain=2"])).as_system().components.values()
     assert component.parameters == {"gain": 2.0}
     refused = main("run", fmu, "--in-process", code=1).stderr
+    assert "u = 1 2 3: expected 2 numbers" in main("run", fmu, "--set", "u=1 2 3", code=2).stderr
     assert "fmi3GetInt8: returned fmi3Error, without a message, for lost" in refused
 
 
