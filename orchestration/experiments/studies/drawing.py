@@ -70,7 +70,8 @@ def _medians(study: Study, store: Path, metric: str | None) -> "dict[str, pd.Dat
     if study.repeat is None or study.cell_names is None or metric in (None, GOOD):
         return {}
     table, names = with_chance(frame(store), study), study.cell_names
-    found = {"medians": cells_of(table, names, metric).rename(columns={"value": "median"})}
+    cells = cells_of(table, names, metric)
+    found = {"medians": cells.assign(median=cells.pop("value"))}
     if (laws := laws_of(table, names)) is not None:
         differences = differences_of_medians(table, names, laws, metric)
         found["differences"] = differences.assign(law=laws.second, minus=laws.first)

@@ -296,10 +296,11 @@ function pointTraces() {
       return Number.isNaN(value) ? (Number.isFinite(bottom) ? bottom : 0) : value;
     };
     const word = { good: report.words[0], bad: report.words[1], diverged: "diverged" }[kind];
+    const missing = map.y === VALUE && rows.some((row) => Number.isNaN(cellOf(map.metric, row)));
     const colored = kind === "good" && map.y !== VALUE;
     const plain = { good: COLORS[0], bad: paint("bad"), diverged: COLORS[1] }[kind];
     return {
-      type: "scatter", mode: "markers", name: escaped(`${word} (${rows.length})`),
+      type: "scatter", mode: "markers", name: escaped(`${word} (${rows.length}${missing ? "; without a value at the foot" : ""})`),
       x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, said: (i) => hoverOf(rows[i]), faded: rows.map(isOutside),
       marker: {
         symbol: MARKS[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" ? 0 : 1.5, color: plain },
