@@ -35,6 +35,8 @@ STILL = 1e-8
 """Growth rate that counts as 0 [1/s]"""
 MOST = 500
 """Delays that are tried, at most"""
+REFINED = 16
+"""Times that frequencies are halved where the return difference changes by more than its least singular value"""
 SIDES = (0.0, 1.0 / NANOSECONDS)
 """Delays beyond a jump [s]: none, and the next one"""
 MOST_JUMPS = 40
@@ -71,7 +73,7 @@ def delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> f
         if now[1] > 0.0:
             return zero_between(command.growth, _rounded, before, now, zero=STILL)[0]
         before = now
-    raise UsageError(f"the loop is stable with all delays up to {quantity(before[0], 's')}, the longest that was tried")
+    raise UsageError(f"the loop is stable with all delays up to {quantity(delay, 's')}, the longest that was tried")
 
 
 def jumps_of(system: System, name: str) -> tuple[float, ...]:
@@ -140,31 +142,47 @@ class LateCommand:
     def tolerated(self, delay: float) -> float:
         """The further delay that is tolerated for certain [s]."""
         samples, dt = self.loop.samples, self.loop.dt
-        sensitivity = self._sensitivity(delay)
+        frequencies, difference = self._fine(delay)
         turns = np.arange(samples) - samples // 2
-        at = np.add.outer(self.frequencies, 2.0 * math.pi * turns / self.loop.rest.dt)
+        at = np.add.outer(frequencies, 2.0 * math.pi * turns / self.loop.rest.dt)
         at = np.abs((at + math.pi / dt) % (2.0 * math.pi / dt) - math.pi / dt)
         waves = np.exp(1j * np.outer(np.arange(samples), 2.0 * math.pi * turns / samples)) / math.sqrt(samples)
-        waves = waves * np.exp(1j * np.outer(self.frequencies * dt, np.arange(samples)))[:, :, None]
-        moved = (np.eye(samples) - sensitivity) @ waves * at[:, None, :]
+        waves = waves * np.exp(1j * np.outer(frequencies * dt, np.arange(samples)))[:, :, None]
+        moved = (np.eye(samples) - np.linalg.inv(difference)) @ waves * at[:, None, :]
         return float(1.0 / max(np.linalg.norm(moved, 2, axis=(1, 2)).max(), np.finfo(float).tiny))
 
     def ends_stability(self, part: float) -> bool:
         """Whether enough whole samples beside a part of one make the loop unstable: its gain is somewhere above 1."""
         samples = self.loop.samples
         gains = np.linalg.inv(self._soon(_rounded(part))) - np.eye(samples)
-        each = (np.linalg.eigvals(gains @ self._shift(whole)) for whole in range(samples))
+        each = (np.linalg.eigvals(gains @ self._shift(whole, self.frequencies)) for whole in range(samples))
         return any(bool(np.abs(values).max() > 1.0) for values in each)
 
-    def _sensitivity(self, delay: float) -> Complexes:
+    def _fine(self, delay: float) -> tuple[Floats, Complexes]:
+        """Frequencies, so close that the return difference is not near 0 between two of them, and it at each."""
         whole, part = self._split(delay)
-        soon = self._soon(part)
-        return np.asarray(np.linalg.solve(soon + (np.eye(self.loop.samples) - soon) @ self._shift(whole), soon))
+        frequencies = self.frequencies
+        difference = self._difference(self._soon(part), whole, frequencies)
+        for _ in range(REFINED):
+            least = np.linalg.norm(difference, -2, axis=(1, 2))
+            apart = np.linalg.norm(np.diff(difference, axis=0), 2, axis=(1, 2)) > np.minimum(least[:-1], least[1:])
+            if not apart.any():
+                break
+            between = 0.5 * (frequencies[:-1] + frequencies[1:])[apart]
+            added = self._difference(sensitivity_of(self._late_by(part), self.i, between), whole, between)
+            order = np.argsort(frequencies := np.append(frequencies, between))
+            frequencies, difference = frequencies[order], np.concatenate([difference, added])[order]
+        return frequencies, difference
 
-    def _shift(self, whole: int) -> Complexes:
+    def _difference(self, soon: Complexes, whole: int, frequencies: Floats) -> Complexes:
+        """The return difference over the samples, of the loop whose sensitivity without the whole ones is `soon`."""
+        one = np.eye(self.loop.samples)
+        return np.asarray(one + (np.linalg.inv(soon) - one) @ self._shift(whole, frequencies))
+
+    def _shift(self, whole: int, frequencies: Floats) -> Complexes:
         """A delay by whole samples at each frequency, shape (n, samples, samples)."""
         samples = self.loop.samples
-        z = np.exp(1j * self.frequencies * self.loop.rest.dt)
+        z = np.exp(1j * frequencies * self.loop.rest.dt)
         found = np.zeros((len(z), samples, samples), dtype=complex)
         for sample in range(samples):
             periods, place = divmod(sample - whole, samples)

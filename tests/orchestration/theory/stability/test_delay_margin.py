@@ -93,3 +93,12 @@ def test_the_delay_margin_is_the_first_delay_at_which_the_map_is_unstable(
     sooner = np.linspace(0.0, found - 2e-9, 100)
     assert max(radius_late(plant, gains, dt, delay) for delay in sooner) < 1.0
     assert radius_late(plant, gains, dt, found + 2e-9) > 1.0
+
+
+def test_a_margin_of_many_samples_is_found_between_frequencies_far_apart() -> None:
+    plant, gains = np.array([[0.0, 1.0, 0.0], [0.0, -50.0, 50.0]]), [[1.0, 0.0]]
+    loop, late = loop_of(plant, gains, 0.01)
+    half = math.pi / loop.dt
+    found = delay_margin(loop, 0, np.geomspace(1e-3 * half, half, 30), late)
+    assert found is not None
+    assert radius_late(plant, gains, 0.01, found - 2e-8) < 1.0 < radius_late(plant, gains, 0.01, found + 2e-8)
