@@ -26,6 +26,10 @@ NEAR, MOST = 2.0, 0.4
 """Half the width of the panel about 1, in distances of the slower half of the poles from it, and at most"""
 HIGHEST = 2.0
 """Largest spectral radius that is drawn"""
+ANGLES = (15.0, 30.0, 45.0, 90.0)
+"""Distances of ticks of a phase [°]: the least with which they are few"""
+EDGE = 0.25
+"""Share of the width, from the left, in which a label stands to the right of its line"""
 LEAST = 1e-12
 """Least gain that is drawn: less is rounding, as of a slow task beyond half its own rate"""
 
@@ -52,7 +56,9 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     for axes in (above, below):
         axes.axhline(0.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.axhline(-180.0, color=GREY, linewidth=1.0, linestyle=":")
-    middle.yaxis.set_major_locator(MultipleLocator(90.0))
+    middle.margins(y=0.15)
+    low, high = middle.get_ylim()
+    middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
     middle.set(ylabel="phase of L [°]")
     below.set(ylabel="sensitivity |1 / (1 + L)| [dB]", xlabel="frequency [rad/s], up to half the sampling rate")
@@ -91,7 +97,9 @@ def _mark_margins(
             continue
         beside: dict[str, Any]
         if axes is above:  # where a gain falls there is room below it to the left, and above it to the right
-            beside = {"xytext": (-5.0, 0.0), "ha": "right"} if end > none else {"xytext": (5.0, 0.0)}
+            first, last = np.log(frequencies[[0, -1]])
+            has_room = math.log(at) > first + EDGE * (last - first)
+            beside = {"xytext": (-5.0, 0.0), "ha": "right"} if end > none and has_room else {"xytext": (5.0, 0.0)}
             axes.annotate(
                 size, (at, 0.5 * (none + end)), textcoords="offset points", va="center", color=color, **beside
             )
