@@ -85,7 +85,7 @@ def test_a_failed_compile_does_not_continue_runs_in_lanes_by_another_engine(
         done = main("sweep", path, *quiet, code=1)
     assert done.stderr.splitlines()[-1] == (
         f"quadcosim: {STORE}: expected engine batch, as of the runs there (no compiler); another one needs another "
-        "--out"
+        "folder, --out"
     )
     assert bits(STORE) == before
     path.write_text(BEGUN)
