@@ -72,7 +72,7 @@ class SampledRest:
         fmu = LiftedInstance(rest, samples, self.period)
         lifted = Excitation(lifted_rest(rest, fmu, samples))
         lifted.measure_as(excitation)
-        return LiftedTangent(_tangent(lifted, Rung(1, samples * self.period), count), rest, fmu, samples)
+        return LiftedTangent(_tangent(lifted, Rung(1, samples * self.period), count, samples), rest, fmu, samples)
 
 
 def of_samples(rest: Rest, period: float) -> SampledRest:
@@ -95,13 +95,13 @@ def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung]) -> int:
     return count
 
 
-def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
-    """The tangent of a component whose samples are alike, and linear over `count` of them."""
+def _tangent(excitation: Excitation, sample: Rung, count: int, samples: int = 1) -> Tangent:
+    """The tangent of a component whose samples, or groups of several, are alike, and linear over `count` of them."""
     ladder = [sample] * max(1, count // 2)
 
     def proved(excitation: Excitation) -> Tangent:
         tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
-        tangent.fit(sample.h, 2.0 * len(ladder) * sample.h)
+        tangent.fit(sample.h, 8.0 * len(ladder) * sample.h)
         tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
         return tangent
 
@@ -117,7 +117,15 @@ def _tangent(excitation: Excitation, sample: Rung, count: int) -> Tangent:
             refused.append(error)
     if not found:
         raise (ImpreciseError if excitation.is_coarse else UsageError)(str(refused[0]))
-    return min(found, key=lambda one: max(one.accuracy, one.precision))
+    best = min(found, key=lambda one: max(one.accuracy, one.precision))
+    try:
+        best.prove_held(sample.h, samples)
+    except UsageError:
+        if excitation.is_coarse:
+            raise
+        excitation.use_large_pulses([sample] * FEW)
+        return _tangent(excitation, sample, count, samples)
+    return best
 
 
 def in_continuous_time(rest: Rest, period: float, step: float, *, unit: float | None = None) -> Tangent:

@@ -39,6 +39,14 @@ IMPRECISE = 1e-3
 """Error of a predicted response of a component that rounds coarsely, from which its model is refused"""
 PROOF_STEPS = 256
 """Steps of the random input, at most"""
+HELD_STEPS = 1024
+"""Samples over which inputs are held to see slow states, at most"""
+UNSEEN = 1e-4
+"""Error of the response to a held input, relative to it at the end, from which slow states are taken to be missed"""
+ROUGHLY = 0.02
+"""The same of a component that rounds coarsely, from which its model is refused"""
+SMALL = 0.01
+"""Share of the largest response, below which one at the end counts as that much"""
 EXCITED = 0.75
 """Share of the steps of a response that is fitted, after which the inputs are at rest"""
 LINEAR = 1e-6
@@ -207,6 +215,43 @@ class Tangent(LinearSimulator):
                 f"random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, expected at most "
                 f"{allowed:g}{cause}"
             )
+
+    def prove_held(self, h: float, samples: int = 1) -> None:
+        """Compare its responses to inputs that are held, in steps of `h` [s], with those of the component.
+
+        Of several `samples` in a step each input is held at all of them.
+
+        They show slow states, as of an integral, that rounding hides from short responses. Raises `UsageError` where
+        they differ; `accuracy` of a component that rounds coarsely covers the difference.
+        """
+        excitation, rung, cut = self._excitation, self._rung(h), len(self.outputs)
+        by_state, by_input = self.derivatives(h)
+        first, rounding = 2 * len(self.ladder), SINGLE if excitation.is_coarse else ROUNDING
+        steps, several = max(2 * first, HELD_STEPS // samples), len(self.inputs) // samples
+        for i, name in enumerate(self.inputs[:several]):
+            move = np.zeros(len(self.inputs))
+            move[i::several] = 0.5 * excitation.pulses[i::several]
+            predicted, state = np.zeros((steps, cut)), np.zeros(len(self.state))
+            for k in range(steps):
+                after = by_state @ state + by_input @ move
+                predicted[k], state = after[:cut], after[cut:]
+            known = 2.0 * np.abs(predicted[:first]).max(axis=0, initial=0.0)
+            beyond = np.flatnonzero((np.abs(predicted[first:]) > known).any(axis=1))
+            count = first + int(beyond[0]) if len(beyond) else steps
+            measured = excitation.response_to(np.tile(move, (count, 1)), rung)
+            late = slice(count // 2, None)
+            size = np.maximum(np.abs(measured[late]).max(axis=0), SMALL * np.abs(measured).max(axis=0))
+            error = np.abs(measured - predicted[:count])[late].max(axis=0) - STANDS_OUT * rounding * excitation.weight
+            found = float((np.maximum(error, 0.0) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
+            allowed = ROUGHLY if excitation.is_coarse else UNSEEN
+            if not found <= allowed:
+                raise (ImpreciseError if excitation.is_coarse else UsageError)(
+                    f"{excitation.name}: its linear model, of {len(self.state)} states, does not predict the response "
+                    f"to {name} held over {count * h:.3g} s: off by {found:.1g} of it, expected at most {allowed:g}, "
+                    "as where rounding hides a slow integral"
+                )
+            if excitation.is_coarse:
+                self.accuracy = max(self.accuracy, found)
 
     # -- coordinates --------------------------------------------------------------------------------------------
 

@@ -134,7 +134,7 @@ def test_a_component_of_several_rates_is_pulsed_at_one_sample_to_choose_and_what
     before = fmu.steps
     measured = begun.tangent()
     assert set(pulsed) == {("u",)}
-    assert fmu.steps - before < 1500
+    assert fmu.steps - before < 4000
     assert responses(measured, 9) == pytest.approx(responses(Alternating(3), 9), abs=1e-8)
 
 
@@ -247,8 +247,29 @@ class Integrating(Line):
 def test_an_integral_in_single_precision_is_known_as_well_as_said(proportional: float, integral: float) -> None:
     measured = tangent(Integrating(proportional, integral))
     later = responses(measured, 3)
-    assert 0.0 < measured.precision < 1e-3
+    assert 0.0 < measured.precision < 5e-3
     assert later == pytest.approx([proportional, integral, integral], rel=measured.precision)
+
+
+class Differentiating(Line):
+    """A law in single precision at rest at 0, whose derivative is large beside its integral."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.kept = np.zeros(3)  # the integral, the last input, and the output
+
+    def step(self, t: float, h: float) -> None:
+        held, before, u = (np.float32(x) for x in (*self.kept[:2], self.u))
+        output = np.float32(120.0) * (u - before) + np.float32(2.0) * u + held
+        self.kept = np.array([held + np.float32(1e-4) * u, u, output], dtype=float)
+
+
+def test_a_model_without_a_slow_integral_is_refused_by_the_response_to_a_held_input() -> None:
+    ladder = [Rung(1, 1.0)] * 8
+    with_integral, without = (Tangent(Excitation(rest(Differentiating())), ladder, 6, most=most) for most in (2, 1))
+    with_integral.prove_held(1.0)
+    with pytest.raises(UsageError, match=r"does not predict the response to u held over"):
+        without.prove_held(1.0)
 
 
 class Quantising(Line):
