@@ -191,10 +191,6 @@ def main(arguments: list[str]) -> int:
     return packaging.main(arguments[single:], functools.partial(write, single=single))
 
 
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
-
-
 _DOUBLE, _SINGLE = ("lanes.h", "mathematics.h", "integers.h"), ("single.h", "integers.h")
 _NAME = re.compile(r"\b(?:[qQ]_\w+|QUADCOSIM_LANES)\b")
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -288,3 +284,7 @@ def _is_whole(text: str) -> bool:
     if len(re.findall(r"^#if", bare, re.MULTILINE)) != len(re.findall(r"^#endif", bare, re.MULTILINE)):
         return False
     return bare.startswith("#") or (bare.count("{") == bare.count("}") and bare[-1] in ";}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

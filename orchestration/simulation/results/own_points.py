@@ -31,7 +31,7 @@ def points_of(system: System, fixed: Mapping[str, FixedStep], end: int) -> Point
     from orchestration.systems.schedule.streams import Streams
 
     names, table = list(system.components), timetable(system, Streams(system.seed, system.streams), fixed)
-    times, begins, stepped = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], []
+    times, begins, stepped = ([np.zeros(0, dtype=np.int64)] for _ in range(3))
     count = last = 0
     while last < end and (schedule := table.next_schedule(2**15)) is not None:
         times.append(schedule.times[:-1])
