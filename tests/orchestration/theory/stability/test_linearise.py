@@ -11,6 +11,7 @@ import pytest
 
 import quadcosim
 from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -158,4 +159,4 @@ def test_the_command_writes_the_matrices_that_python_has(main: Main) -> None:
     assert loop.radius == pytest.approx(np.abs(np.linalg.eigvals(closed(loop))).max(), rel=1e-9)
     lines = main("linearise", file).stdout.splitlines()
     assert lines[0].startswith(f"stable: spectral radius {loop.radius:.4g}, sampled every ")
-    assert lines[2].endswith(f"{len(loop.rest.A)} states, every {loop.rest.dt:g} s")
+    assert lines[2].endswith(f"{len(loop.rest.A)} states, every {time_text(loop.rest.dt)}")
