@@ -91,7 +91,9 @@ def about_hover(scenario: Scenario, of: str) -> LinearLimit:
         outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
         method=HOVER,
         accuracy=None if limit is None else HOVER_ACCURACY * limit,
-        reason="the spectral radius about hover stays below one to the end of the range, or is above it from the start",
+        reason=""
+        if limit is not None
+        else "the spectral radius about hover stays below one to the end of the range, or is above it from the start",
     )
 
 

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.text import Text
 
 import quadcosim
-from orchestration.command import studies
+from orchestration.command import study_table
 from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, decimals_of, lines, with_interval
 from orchestration.experiments.studies import drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
@@ -305,7 +305,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
 
 def test_a_small_end_of_an_interval_keeps_its_sign() -> None:
     ends = pd.DataFrame({"share": [0.1, -1e-17], "low": [-0.0041, 0.0], "high": [0.256, 0.3]})
-    assert studies._texts(ends, "share", 2) == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
+    assert study_table._texts(ends, "share", 2) == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
     assert with_interval(299 / 300, 0.98, 1.0, decimals_of(300)) == "0.997 [0.980, 1.000]"
 
 
