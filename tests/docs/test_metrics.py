@@ -38,7 +38,7 @@ def test_the_page_has_the_units_that_follow_from_those_of_the_fmus(flight: Resul
 def test_figures_and_tables_name_every_metric_of_a_flight_in_words(flight: Result) -> None:
     for name, unit in flight.units.items():
         assert display_names.METRICS.get(name, ("", None))[1] == unit, (
-            f'{name}: expected a line "{name}": ("WORDS", "{unit}") of METRICS in '
+            f'{name}: expected a line {name} = ["WORDS", "{unit}"] under [metrics] of '
             f"orchestration/simulation/results/display_names.toml"
         )
 

@@ -72,7 +72,7 @@ def test_a_solver_finds_every_output_with_its_value_after_the_states_are_set() -
     found = np.array(slave.get_real(seen))
     names = np.array([QuadrotorPlant.variables[i].name for i in seen])
     assert [*names[np.abs(found - expected) > 1e-12]] == []
-    assert [*names[found == before]] == [], "expected a value that moves"
+    assert [*names[found == before]] == [], "expected a value that moves: observe of plant_fmu/observed.py sets it"
 
 
 def test_the_length_of_the_attitude_returns_to_one_and_moves_no_force() -> None:

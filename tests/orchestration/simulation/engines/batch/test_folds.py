@@ -107,5 +107,5 @@ def test_of_a_signal_without_a_value_at_times_lanes_say_the_same_or_leave_the_ru
         if functions == REFUSED:
             assert found is None
         else:
-            assert found is not None, "a new reduction that leaves runs with NaN is one of REFUSED in this file"
+            assert found is not None, f"a new reduction that leaves runs with NaN is one of REFUSED in {__file__}"
             assert_the_same_numbers(what, found.metrics, ran(what, "compiled", load=kept.load).metrics)
