@@ -10,13 +10,17 @@ from orchestration.foundation.basics.errors import UsageError
 from quadcosim import Scenario, fly
 
 CLAIMS = records.load_claims()
+BY_HAND = {"crazyflie_firmware"}
+"""Data from the tables of two studies, which need the sources of a firmware"""
 
 
 def test_pages_say_what_the_records_say() -> None:
     for page, texts in records.blocks().items():
         content = (records.ROOT / page).read_text(encoding="utf-8")
         for name, text in texts.items():
-            assert f"<!-- {name} -->\n\n{text}\n\n<!-- end -->" in content, f"{page}: python -m docs.claim_records"
+            assert f"<!-- {name} -->\n\n{text}\n\n<!-- end -->" in content, (
+                f"{page}, {name}: expected what its record says, as `python -m docs.claim_records` writes it"
+            )
 
 
 def test_every_marked_place_has_its_record() -> None:
@@ -40,6 +44,16 @@ def test_every_command_names_a_study_or_a_section_that_exists(name: str) -> None
         else:
             known = (records.ROOT / place).is_file()
         assert known, f"docs/claims/{name}.toml: its commands name {place}, which does not exist"
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_the_commands_of_a_record_write_the_data_of_its_numbers(name: str) -> None:
+    written = {Path(place.removeprefix("section ")).stem for place in records.files_of(CLAIMS[name])} | BY_HAND
+    read = {Path(reference.partition("#")[0]).stem for reference in CLAIMS[name].numbers.values()}
+    assert read <= written, (
+        f"docs/claims/{name}.toml: its numbers are in docs/data/{', '.join(sorted(read - written))}.json: expected a "
+        f"command that names the study, the comparison or the section of docs.make_findings which writes it"
+    )
 
 
 @pytest.mark.parametrize("name", CLAIMS)
