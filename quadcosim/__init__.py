@@ -22,7 +22,7 @@ Where to begin:
 - `schedule` computes which task or message has each computer and network when, and bounds on response times;
 - `linearise` opens a loop about its operating point, sampled, held and delayed as it is: two state-space systems;
 - `bode` computes gain, phase and delay margins of a sampled loop with its delays, `step` how it takes back a step,
-  `locus` its poles over a quantity;
+  `locus` its poles over a quantity; `plant_at_start` has the matrices of one FMU;
 - `sweep` runs a `Study` over axes, `compare` compares controllers, `tune` searches for gains: stored runs are not
   repeated, and results become a table with `to_pandas`;
 - `Simulation` stops a run at each sample, where your code takes the place of a controller or any other component;
@@ -98,6 +98,7 @@ if TYPE_CHECKING:  # also what `__getattr__` finds public names by
     from orchestration.theory.exact.expect import Expected, expect
     from orchestration.theory.stability.frequency import Bode, bode
     from orchestration.theory.stability.linearise import Linearised, linearise
+    from orchestration.theory.stability.plant_at_start import PlantAtStart, plant_at_start
     from orchestration.theory.stability.root_locus import RootLocus, locus
     from orchestration.theory.stability.state_space import StateSpace
     from orchestration.theory.stability.step_response import Step, step
@@ -127,6 +128,7 @@ __all__ = [
     "Message",
     "Model",
     "Network",
+    "PlantAtStart",
     "QuadcosimError",
     "Record",
     "ReferenceChoice",
@@ -174,6 +176,7 @@ __all__ = [
     "locus",
     "margin",
     "margin_region",
+    "plant_at_start",
     "read_model",
     "report",
     "resume",

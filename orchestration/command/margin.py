@@ -156,10 +156,11 @@ def linearise(
     Poles are those of the closed loop, in the z-plane; frequency and damping are of log(z) / dt. With --json A, B, C
     and D of both, and the names of their inputs and outputs.
 
-    Of one FMU, for model exchange: A, B, C and D in continuous time about its start, with the poles of A.
+    Of one FMU: A, B, C and D about its start, with the poles of A; in continuous time by model exchange, with --period
+    from sample to sample by any interface.
     """
-    if scenario is not None and scenario.suffix.lower() == ".fmu":
-        return _of_plant(request_from(scenario, flags, timing))
+    if scenario is not None and scenario.suffix.lower() == ".fmu" and component is None:
+        return _of_plant(request_from(scenario, dataclasses.replace(flags, period=None), timing), flags.period)
     from orchestration.theory.stability.linearise import linearise as linearised_loop
 
     loop = linearised_loop(request_from(scenario, flags, timing), component)
@@ -185,13 +186,13 @@ def linearise(
     return CommandResult(document=document, verdict=loop.verdict, lines=lines)
 
 
-def _of_plant(request: "Request") -> CommandResult:
+def _of_plant(request: "Request", period: float | None) -> CommandResult:
     """The matrices of one FMU about its start, as tables, and its poles."""
     import numpy as np
 
     from orchestration.theory.stability.plant_at_start import plant_at_start
 
-    plant = plant_at_start(request)
+    plant = plant_at_start(request, period)
     lines = list[str]()
     for name, rows, columns in (
         ("A", plant.states, plant.states),
@@ -207,7 +208,7 @@ def _of_plant(request: "Request") -> CommandResult:
     lines += ["", f"poles  {', '.join(f'{pole:.4g}' for pole in poles)}"] if poles else []
     document = {
         **{name: getattr(plant, name).tolist() for name in "ABCD"}, "states": plant.states, "inputs": plant.inputs,
-        "outputs": plant.outputs, "operating_point": plant.operating_point, "rates": plant.rates,
+        "outputs": plant.outputs, "operating_point": plant.operating_point, "rates": plant.rates, "dt": plant.dt,
         "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in poles],
     }  # fmt: skip
     return CommandResult(document=document, verdict=plant.verdict, lines=lines)

@@ -32,6 +32,7 @@ from orchestration.theory.stability.poles import Pole, as_poles, poles_of
 from orchestration.theory.stability.state_space import StateSpace, reduced
 
 Found = TypeVar("Found")
+Asked = TypeVar("Asked")
 
 NEAR_ONE = 1e-7
 """Distance of a spectral radius from 1 that rounding may explain"""
@@ -97,12 +98,12 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     return in_isolation(request, _linearised, component)
 
 
-def in_isolation(request: RequestLike, find: Callable[[Request, str | None], Found], component: str | None) -> Found:
-    """What `find` says of a request and a component, in a process that may load its FMUs, or their native twins."""
+def in_isolation(request: RequestLike, find: Callable[[Request, Asked], Found], asked: Asked) -> Found:
+    """What `find` says of a request and, say, a component, in a process that may load its FMUs, or their twins."""
     loaded, _ = single_run_execution(request_of(request), "auto")
     with errors_in_own_terms(loaded):
         files = files_of(system_of(loaded))
-    return isolated_call(files.fmus.values(), find, loaded, component)
+    return isolated_call(files.fmus.values(), find, loaded, asked)
 
 
 def _linearised(request: Request, component: str | None) -> Linearised:
@@ -116,6 +117,12 @@ def _linearised(request: Request, component: str | None) -> Linearised:
 def sampled_component(system: System, component: str | None) -> str:
     """The component at which a loop is cut open; raises `UsageError` for one that is not sampled."""
     expect_whole_instances(system)
+    if all(each.sampling is None for each in system.components.values()):
+        raise UsageError(
+            "nothing is sampled, so that there is no loop to cut open: expected a controller with sampling = "
+            "{ period = SECONDS }, as quadcosim connect PLANT.fmu CONTROLLER.fmu proposes; the matrices of one FMU are "
+            "those of quadcosim linearise PLANT.fmu, in Python plant_at_start"
+        )
     name = component_named(system, component, "at which to cut the loop open")
     if system.components[name].sampling is None:
         raise UsageError(f"component: {name}: expected a sampled component")

@@ -262,6 +262,8 @@ def expect_whole_instances(system: System) -> None:
 
 
 def _expect_period(system: System) -> Fraction:
+    if not system.connections:
+        raise UsageError("there is no loop, as no component is connected: expected [[connections]]")
     expect_fixed_periods(system)
     expect_whole_instances(system)
     for name, component in system.components.items():
