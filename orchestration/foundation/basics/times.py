@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second"""
+ROUNDED = 2**50
+"""A time that is nearer to whole nanoseconds than its size over this is taken for them: a float's last digits, rounded
+in a product or a sum, are up to four times finer"""
 
 
 @overload
@@ -29,8 +32,10 @@ def seconds(
 
 @functools.lru_cache(maxsize=4096)  # most times are common to the runs of a study
 def exact_nanoseconds(seconds: float) -> Fraction:
-    """The rational number that the decimal form of `seconds` means, in nanoseconds."""
-    return Fraction(repr(float(seconds))) * NANOSECONDS
+    """The rational number that the decimal form of `seconds` means, in nanoseconds; 12 ms of 0.012000000000000002."""
+    exact = Fraction(repr(float(seconds))) * NANOSECONDS
+    whole = round(exact)
+    return Fraction(whole) if abs(exact - whole) * ROUNDED <= abs(whole) else exact
 
 
 def nanoseconds(seconds: float) -> int:

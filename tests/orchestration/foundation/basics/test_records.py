@@ -79,6 +79,13 @@ def test_whether_a_time_is_at_least_so_many_nanoseconds_is_decided_by_decimals()
     Sampling(period=1.3e-9, clock_ratio=1.3)
 
 
+def test_a_time_whose_last_digits_were_rounded_is_whole_nanoseconds_and_no_other_is() -> None:
+    assert Sampling(period=12_000_000 * 1e-9).true_period == 12_000_000  # 0.012000000000000002
+    for period in np.linspace(0.001, 0.02, 20):
+        assert exact_nanoseconds(float(period)).denominator == 1
+    assert exact_nanoseconds(0.3333333333333333) == Fraction(3333333333333333, 10**7)
+
+
 def test_a_key_has_one_name_and_no_schema_has_another() -> None:
     with pytest.raises(UsageError, match=r"^design_seed: no such key; expected one of method, samples, seed"):
         parsed({"design_seed": 3}, DesignTable)

@@ -58,7 +58,8 @@ class Message(NamedTuple):
 
 def exactly(seconds: float) -> Fraction:
     """The decimal that a double stands for, in nanoseconds."""
-    return Fraction(repr(float(seconds))) * 10**9
+    decimal = Fraction(repr(float(seconds))) * 10**9
+    return Fraction(round(decimal)) if abs(decimal - round(decimal)) <= abs(round(decimal)) / 2**50 else decimal
 
 
 def points(step: float, after: int) -> list[int]:
