@@ -86,6 +86,27 @@ def test_what_initial_unknowns_lacks_is_said_once(tmp_path: Path) -> None:
     assert validate(path) == [Finding("initial-unknowns", "InitialUnknowns: x is there 0 times, expected once")]
 
 
+@needs_compiler
+@pytest.mark.parametrize(
+    ("given", "instead", "finding"),
+    [
+        (
+            '<Outputs><Unknown index="2"/>',
+            '<Outputs><Unknown index="9"/>',
+            ("indices", "Outputs: index 9, expected 1 to"),
+        ),
+        ("<Real/>", '<Real displayUnit="mm"/>', ("standard", "a variable refers to a displayUnit without a unit;")),
+    ],
+)
+def test_what_a_description_refers_to_in_vain_is_named_and_no_error_of_its_reader_is(
+    given: str, instead: str, finding: tuple[str, str], tmp_path: Path
+) -> None:
+    (found,) = validate(lag(tmp_path / "Lag.fmu", described={given: instead}))
+    rule, text = finding
+    assert found.rule == rule
+    assert found.text.startswith(text)
+
+
 def damaged(fmu: Path, path: Path, *damages: Damage) -> Path:
     files = files_of(fmu)
     for damage in damages:

@@ -23,6 +23,11 @@ def standard(archive: Archive) -> list[str]:
         read_model_description(str(archive.path), validate_model_structure=True)  # names: by `variables.names`
     except ValidationError as error:
         problems = error.problems
+    except IndexError:
+        return []  # an index of ModelStructure, which `indices` names
+    except KeyError as error:
+        of = "a displayUnit without a unit" if error.args == (None,) else f"{error}, which is not declared"
+        problems = [f"a variable refers to {of}; fmpy reads no further"]
     except Exception as error:  # it reads attributes strictly, and fails on damage in various ways
         problems = [f"fmpy does not read it: {type(error).__name__}: {error}"]
     texts = [" ".join(str(problem).split()) for problem in problems]
