@@ -36,7 +36,7 @@ STILL = 1e-8
 MOST = 500
 """Delays that are tried, at most"""
 REFINED = 16
-"""Times that frequencies are halved where the return difference changes by more than its least singular value"""
+"""Times that frequencies are halved where the return difference changes by more than its own size, in any direction"""
 SIDES = (0.0, 1.0 / NANOSECONDS)
 """Delays beyond a jump [s]: none, and the next one"""
 MOST_JUMPS = 40
@@ -164,8 +164,9 @@ class LateCommand:
         frequencies = self.frequencies
         difference = self._difference(self._soon(part), whole, frequencies)
         for _ in range(REFINED):
-            least = np.linalg.norm(difference, -2, axis=(1, 2))
-            apart = np.linalg.norm(np.diff(difference, axis=0), 2, axis=(1, 2)) > np.minimum(least[:-1], least[1:])
+            inverse, change = np.linalg.inv(difference), np.diff(difference, axis=0)
+            relative = (np.linalg.norm(end @ change, axis=(1, 2)) for end in (inverse[:-1], inverse[1:]))
+            apart = np.maximum(*relative) > 1.0
             if not apart.any():
                 break
             between = 0.5 * (frequencies[:-1] + frequencies[1:])[apart]

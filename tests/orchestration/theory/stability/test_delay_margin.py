@@ -8,9 +8,11 @@ import pytest
 from scipy.linalg import expm
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.theory.stability import delay_margin as delay_margins
 from orchestration.theory.stability.delay_margin import Late, delay_margin
 from orchestration.theory.stability.linearise import Linearised
-from orchestration.theory.stability.loop_halves import radius
+from orchestration.theory.stability.loop_halves import radius, sensitivity_of
+from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
 
 PLANT = np.array([[2.9, -3.2, -1.9], [-1.8, 2.6, 2.1]])
@@ -102,3 +104,23 @@ def test_a_margin_of_many_samples_is_found_between_frequencies_far_apart() -> No
     found = delay_margin(loop, 0, np.geomspace(1e-3 * half, half, 30), late)
     assert found is not None
     assert radius_late(plant, gains, 0.01, found - 1e-6) < 1.0 < radius_late(plant, gains, 0.01, found + 1e-6)
+
+
+def test_frequencies_of_several_samples_are_not_refined_for_gains_that_are_large_beside_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Those of a double integrator at low frequencies, whose samples together have a large gain in one direction."""
+    points = list[int]()
+
+    def counted(loop: Linearised, i: int, frequencies: Floats) -> Complexes:
+        points.append(len(frequencies))
+        return sensitivity_of(loop, i, frequencies)
+
+    monkeypatch.setattr(delay_margins, "sensitivity_of", counted)
+    plant, gains, dt = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [[1.0, 1.4]] * 3, 0.05
+    loop, late = loop_of(plant, gains, dt)
+    half = math.pi / loop.rest.dt
+    found = delay_margin(loop, 0, np.geomspace(1e-3 * half, half, 100), late)
+    assert found is not None
+    assert radius_late(plant, gains, dt, found - 2e-9) < 1.0 < radius_late(plant, gains, dt, found + 2e-9)
+    assert max(points) == 100
