@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from orchestration.components.building import fmus
 from orchestration.experiments.studies.axes import Axis, Key, LinkedSettings, Value
-from orchestration.experiments.studies.study import StartValues, Study
+from orchestration.experiments.studies.study import StartValues, Study, placed
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.simulation.results.quantities import is_in_seconds
@@ -120,6 +121,8 @@ class Comparison:
     """The value of the second axis by the name of a condition."""
     native: bool = False
     """Whether it is run with the native twins of its FMUs."""
+    folder: Path | None = None
+    """The folder at which paths of files in settings start; None: the current one."""
 
     def __post_init__(self) -> None:
         for kind in ("controllers", "vehicles", "conditions"):
@@ -163,6 +166,7 @@ class Comparison:
             name=self.name,
             base=self.base,
             native=self.native,
+            folder=self.folder,
             axes=(
                 _named(VEHICLE, self.vehicles),
                 _named(CONDITION, self.conditions),
@@ -188,7 +192,9 @@ class Comparison:
 
     def fmu_of(self, controller: Controller) -> str:
         """The FMU of a controller, by name or path."""
-        fmu = str(controller.sets.get(FMU, self.base.as_system().fmus["controller"]))
+        fmu = self.base.as_system().fmus["controller"]
+        if FMU in controller.sets:
+            fmu = str(placed("components.controller.fmu", controller.sets[FMU], self.folder))
         return fmus.native_twin(fmu) if self.native else fmu
 
     def parameters_for(self, entry: VehicleEntry, controller: Controller) -> dict[str, Value]:

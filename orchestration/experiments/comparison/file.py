@@ -6,7 +6,6 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from orchestration.components.building.models import PATHS
 from orchestration.experiments.comparison.design import (
     FMU,
     Comparison,
@@ -106,7 +105,7 @@ def load_comparison(comparison: Comparison | FileLike) -> Comparison:
 def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
     base = control_loop_of(file, folder)
-    axis, second = _axes(file, folder)
+    axis, second = _axes(file)
     vehicles = _vehicles(file.vehicles, base, folder)
     keys = [(entry.name, value) for entry in vehicles for value in axis.values or ()]
     conditions = tuple(_condition(table) for table in file.conditions)
@@ -123,15 +122,16 @@ def _comparison(file: ComparisonFile, path: Path) -> Comparison:
         axis=axis,
         starts=file.starts,
         front=file.front,
+        folder=folder.absolute(),
         **of_second,
     )
 
 
-def _axes(file: ComparisonFile, folder: Path) -> tuple[Axis, Axis | None]:
+def _axes(file: ComparisonFile) -> tuple[Axis, Axis | None]:
     tables = ([] if file.axis is None else [file.axis]) + file.axes
     if not 1 <= len(tables) <= 2 or (file.axis is not None and file.axes):
         raise UsageError("axis: expected [axis], or one or two [[axes]]")
-    axes = [axis_of(table, folder) for table in tables]
+    axes = [axis_of(table) for table in tables]
     return axes[0], axes[1] if len(axes) == 2 else None
 
 
@@ -147,7 +147,7 @@ def _controller(table: ControllerTable, axis: str, keys: list[tuple[str, Value]]
     place = f"controllers.{table.name}"
     sets: dict[str, Value] = {}
     if table.fmu is not None:
-        sets[FMU] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
+        sets[FMU] = table.fmu
     own = _of_controller(parameters_in(table.parameters, f"{place}.parameters"))
     tuned: dict[Key, Mapping[str, Value]] = {}
     if table.file is not None and "{" in table.file:  # one file for each vehicle or value of the axis

@@ -5,9 +5,11 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from orchestration.components.building.fmus import native_twin, native_twins
+from orchestration.components.building.models import PATHS
 from orchestration.experiments.studies.axes import CONTROLLER, Axis, LinkedSettings, Method, Points, Value
 from orchestration.experiments.studies.store_columns import is_column
 from orchestration.foundation.basics.errors import UsageError, expected_name
@@ -15,7 +17,7 @@ from orchestration.foundation.basics.records import record
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.results.own_metrics import OwnMetric
 from orchestration.systems.system.connection import component_of, variable_of
-from orchestration.systems.system.distribution import is_table, trace_path
+from orchestration.systems.system.distribution import from_folder, is_table, trace_path
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, is_source_file, parameter_name, value_at
@@ -55,6 +57,8 @@ class Study:
     """Functions of a result, passed to `sweep`, besides the objectives of the base."""
     native: bool = False
     """Whether it is run with the native twins of its FMUs."""
+    folder: Path | None = None
+    """The folder at which paths of files in values of axes start; None: the current one."""
 
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]
@@ -131,7 +135,10 @@ class Study:
         """The system with a value of each axis, likewise."""
         changes: dict[str, Any] = {}
         chosen = {
-            path: point[axis.name] for axis in self.axes for path in self.paths_of(axis.targets) if names_fmu(path)
+            path: placed(path, point[axis.name], self.folder)
+            for axis in self.axes
+            for path in self.paths_of(axis.targets)
+            if names_fmu(path)
         }
         if self.vary_seed and "seed" not in point:
             changes["seed"] = _own_seed(self.origin.seed, point)
@@ -139,10 +146,18 @@ class Study:
             for axis in self.axes:
                 value = point[axis.name]
                 for path in self.paths_of(axis.targets):
-                    changes[path] = self.product(value, path, chosen, starts) if axis.multiplies else value
+                    changes[path] = (
+                        self.product(value, path, chosen, starts)
+                        if axis.multiplies
+                        else placed(path, value, self.folder)
+                    )
             for each in self.together:
                 sets, multiplies = each.of(point)
-                changes |= {path: value for target, value in sets.items() for path in self._paths[target]}
+                changes |= {
+                    path: placed(path, value, self.folder)
+                    for target, value in sets.items()
+                    for path in self._paths[target]
+                }
                 for target, factor in multiplies.items():
                     for path in self._paths[target]:
                         changes[path] = self.product(factor, path, changes, starts)
@@ -192,6 +207,7 @@ class Study:
         ]
         linked = [item for each in self.together for sets in each.sets.values() for item in sets.items()]
         values += [(path, str(value)) for target, value in linked for path in self._paths[target]]
+        values = [(path, str(placed(path, value, self.folder))) for path, value in values]
         return files_of(
             self.origin,
             fmus_too=[native_twin(value) if self.native else value for path, value in values if names_fmu(path)],
@@ -206,6 +222,16 @@ def _traces(values: Iterable[tuple[str, str]]) -> list[str]:
 
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,99}")
+
+
+def placed(path: str, value: Value, folder: Path | None) -> Value:
+    """A value at a path of a system, a file by its path from the current folder in place of that from another."""
+    if folder is None or not isinstance(value, str) or ".parameters." in path:
+        return value
+    if is_table(value):
+        return from_folder(value, folder)
+    is_file = value.endswith(PATHS) if names_fmu(path) else is_source_file(path)
+    return str(folder / value) if is_file else value
 
 
 def names_fmu(path: str) -> bool:

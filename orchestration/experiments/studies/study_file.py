@@ -6,16 +6,15 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar, cast
 
-from orchestration.components.building.models import PATHS
 from orchestration.experiments.studies.axes import CONTROLLER, Axis, LinkedSettings, Scale, Value, span
-from orchestration.experiments.studies.study import Study, names_fmu
+from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.documents import copied_tables, read_toml, tables_in
 from orchestration.foundation.basics.errors import UsageError, prefixed, shown
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.simulation.requests.request import load_request, request_from_tables
 from orchestration.systems.system.distribution import as_text
-from orchestration.systems.system.paths import is_source_file, value_at
+from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.request import ControlLoop, Request, system_of
 
 
@@ -152,7 +151,7 @@ def control_loop_of(file: HasBase, folder: Path) -> ControlLoop:
 def _study(file: StudyFile, path: Path) -> Study:
     if file.design.design_seed < 0:
         raise UsageError(f"design.seed = {file.design.design_seed}: expected a whole number from 0")
-    axes = tuple(axis_of(table, path.parent) for table in file.axes)
+    axes = tuple(axis_of(table) for table in file.axes)
     base, together = _with_controllers(base_of(file, path.parent), axes)
     study = Study(
         name=file.name or path.stem,
@@ -161,6 +160,7 @@ def _study(file: StudyFile, path: Path) -> Study:
         together=together,
         **file.design.as_dict(),
         keep_signals=file.keep_signals if isinstance(file.keep_signals, bool) else tuple(file.keep_signals),
+        folder=path.parent.absolute(),
     )
     if not study.points:
         raise UsageError("axes: expected at least one point")
@@ -198,7 +198,7 @@ def _expect_consumed(file: StudyFile, study: Study) -> None:
             raise UsageError(f"keep_signals: {index}: expected the indices of runs, from 0 to {len(study.points) - 1}")
 
 
-def axis_of(table: AxisTable, folder: Path) -> Axis:
+def axis_of(table: AxisTable) -> Axis:
     """The axis of a table; raises `UsageError` for an invalid one."""
     if table.sets is not None and table.multiplies is not None:
         raise UsageError(f"axis {table.name}: expected sets or multiplies, not both")
@@ -207,7 +207,7 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
     range_keys = (table.start, table.stop, table.number) != (None, None, None) or table.scale != "linear"
     if (table.values is None) != ranged or (table.values is not None and range_keys):
         raise UsageError(f"axis {table.name}: expected values, or start and stop, with number or to be sampled")
-    values: tuple[Value, ...] | None = None if table.values is None else _values(table.values, targets, folder)
+    values: tuple[Value, ...] | None = None if table.values is None else _values(table.values)
     low, high = table.start or 0.0, 1.0 if table.stop is None else table.stop
     if table.number is not None:
         values = span(table.name, low, high, table.number, table.scale)
@@ -222,17 +222,6 @@ def axis_of(table: AxisTable, folder: Path) -> Axis:
     )
 
 
-def _values(listed: list[Value | dict[str, Any]], targets: tuple[str, ...], folder: Path) -> tuple[Value, ...]:
-    """Listed values: paths relative to the study file made absolute, distributions as the text of their table.
-
-    So values are the same from whichever folder a study is run.
-    """
-    folder = Path(os.path.abspath(folder))
-    are_paths = all(
-        names_fmu(target) or is_source_file(target) or target.endswith(".fmu") or target in CONTROLLER
-        for target in targets
-    )
-    plain = [as_text(value, folder) if isinstance(value, dict) else value for value in listed]
-    return tuple(
-        str(folder / str(value)) if are_paths and str(value).endswith((*PATHS, ".csv")) else value for value in plain
-    )
+def _values(listed: list[Value | dict[str, Any]]) -> tuple[Value, ...]:
+    """Listed values, distributions as the text of their table."""
+    return tuple(as_text(value) if isinstance(value, dict) else value for value in listed)

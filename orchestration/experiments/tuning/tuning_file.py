@@ -70,7 +70,7 @@ def load_tuning(tuning: Tuning | ExactTuning | FileLike) -> Tuning | ExactTuning
 
 
 def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
-    parameters = tuple(axis_of(table, path.parent) for table in file.parameters)
+    parameters = tuple(axis_of(table) for table in file.parameters)
     for axis in parameters:
         if axis.values is not None or axis.multiplies:
             raise UsageError(f"parameters {axis.name}: expected start and stop, and what it sets")

@@ -258,10 +258,16 @@ def is_table(value: object) -> TypeGuard[str]:
     return isinstance(value, str) and value.lstrip().startswith("{")
 
 
-def as_text(table: Mapping[str, Any], folder: Path) -> str:
-    """The text of a table of a file, its trace by a path from the current folder."""
-    keys = {**table, "file": str(folder / str(table["file"]))} if "file" in table else table
-    return f"{{{', '.join(f'{key} = {json.dumps(value, default=str)}' for key, value in keys.items())}}}"
+def as_text(table: Mapping[str, Any]) -> str:
+    """The text of a table of a file."""
+    return f"{{{', '.join(f'{key} = {json.dumps(value, default=str)}' for key, value in table.items())}}}"
+
+
+def from_folder(value: str, folder: Path) -> str:
+    """The text of a table, its trace by a path from the current folder, in place of one from another."""
+    path = trace_path(value)
+    table = toml_of(f"value = {value}", value)["value"]
+    return value if path is None else as_text({**table, "file": str(folder / path)})
 
 
 def trace_path(value: str) -> str | None:

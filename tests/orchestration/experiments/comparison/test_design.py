@@ -8,6 +8,7 @@ import pytest
 
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.file import load_comparison
+from orchestration.experiments.studies.run_key import design_parts
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import value_at
 from quadcosim import UsageError
@@ -124,6 +125,15 @@ def test_a_vehicle_may_tell_a_controller_of_its_own_what_it_tells_no_other(compa
     for system in systems(changed, vehicle="light"):
         assert "gain.eta" not in system.components["controller"].parameters
         assert value_at(system, NOMINAL) in (0.5, 0.75)
+
+
+def test_an_fmu_of_a_comparison_is_found_beside_its_file_and_the_design_does_not_name_the_folder(file: Path) -> None:
+    file.write_text(FILE.replace("native/UnifiedController", "own.fmu"))
+    comparison = load_comparison(file)
+    own = str(file.parent / "own.fmu")
+    assert comparison.fmu_of(comparison.controllers[1]) == own
+    assert {system.components["controller"].fmu for system in systems(comparison, controller="tuned")} == {own}
+    assert str(file.parent) not in "".join(design_parts(comparison.study).values())
 
 
 def test_gains_may_lie_in_a_file_for_each_vehicle_and_value_with_parameters_on_top(comparison: Comparison) -> None:

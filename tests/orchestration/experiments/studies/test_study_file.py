@@ -8,7 +8,7 @@ import pytest
 
 from orchestration.experiments.studies.checks import check_design
 from orchestration.experiments.studies.run_columns import RunColumns
-from orchestration.experiments.studies.run_key import difference, study_parts
+from orchestration.experiments.studies.run_key import design_parts, difference, study_parts
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
@@ -120,14 +120,31 @@ def test_an_axis_may_have_distributions_with_their_traces(tmp_path: Path) -> Non
     assert study.files().tables[str(trace.file)] == trace.file
 
 
-def test_files_on_an_axis_are_the_same_from_every_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "study.toml").write_text('[[axes]]\nname = "controller"\nvalues = ["one.fmu", "UnifiedController"]\n')
-    axes = []
-    for folder, path in ((tmp_path, "study.toml"), (tmp_path.parent, f"{tmp_path.name}/study.toml")):
-        monkeypatch.chdir(folder)
-        axes.append(load_study(path).axes)
-    assert axes[0] == axes[1]
-    assert axes[0][0].values == (str(tmp_path / "one.fmu"), "UnifiedController")
+def test_a_study_in_another_folder_is_the_same_and_its_files_are_those_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (
+        '[[axes]]\nname = "controller"\nvalues = ["one.fmu", "UnifiedController"]\n'
+        '[[axes]]\nname = "timing.delay"\nvalues = [{ file = "trace.csv", column = "delay" }]\n'
+        "[design]\nvary_seed = true\n"
+    )
+    designs, seeds = [], []
+    for name in ("first", "moved"):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "study.toml").write_text(text)
+        (folder / "trace.csv").write_text("delay\n0.001\n0.002\n")
+        monkeypatch.chdir(folder if name == "first" else tmp_path)
+        study = load_study("study.toml" if name == "first" else f"{name}/study.toml")
+        monkeypatch.chdir(tmp_path.parent)
+        system = study.system(0, {})
+        assert system.components["controller"].fmu == str(folder / "one.fmu")
+        assert system.connections[1].delay == Distribution(file=folder / "trace.csv", column="delay")
+        assert study.system(1, {}).components["controller"].fmu == "UnifiedController"
+        designs.append((design_parts(study), [*study.points]))
+        seeds.append([study.system(index, {}).seed for index in range(2)])
+    assert designs[0] == designs[1]
+    assert seeds[0] == seeds[1]
 
 
 def test_a_study_has_no_parts_that_are_not_set_so_that_older_stores_of_it_are_drawn(tmp_path: Path) -> None:
