@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from orchestration.command.printed_tables import PrintedTable, decimals_of, with_interval
+from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
 from orchestration.experiments.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.limits import GridLimit
@@ -74,12 +74,7 @@ def share_text(share: Share) -> str:
 
 def median_text(median: Median, digits: int = 4) -> str:
     """A median with its interval; a dash where no run has the value, no interval where too few have."""
-    if median.value is None:
-        return "-"
-    value, low, high = (
-        "?" if end is None else f"{float(f'{end:.{digits}g}'):g}" for end in (median.value, median.low, median.high)
-    )
-    return value if median.low is None and median.high is None else f"{value} [{low}, {high}]"
+    return to_digits(median.value, median.low, median.high, digits)
 
 
 _UNITS = {"settling_time": ("s", 1.0), "residual": ("mm", 1e3)}

@@ -15,7 +15,7 @@ from orchestration.foundation.basics.errors import UsageError
 
 FORMATS = ("csv", "markdown", "latex")
 MAX_ROWS = 40
-"""Most rows of a table in LaTeX, as fit on one page"""
+"""Most rows of a table in LaTeX, names above rows among them, as fit on one page"""
 LONG = 12
 """Most letters of a name in a leading column of a table in LaTeX; a longer one stands above its rows"""
 WIDE = 68
@@ -62,21 +62,33 @@ def _latex_lines(table: PrintedTable) -> Iterator[str]:
     count = _leading(table)  # columns that stand above their rows
     heads, rows = table.heads[count:], [row[count:] for row in table.rows]
     head, size = _latex_head(heads, rows), rf"\{_size(heads, rows)}\setlength{{\tabcolsep}}{{4pt}}"
-    for start in range(0, max(1, len(rows)), MAX_ROWS):
+    above = [tuple(row[:count]) for row in table.rows]
+    starts = _pages(above)
+    for start, end in zip(starts, [*starts[1:], len(rows)]):
         yield r"\begin{table*}  % needs \usepackage{booktabs}"
         yield rf"\centering{size}"
         yield from [rf"\caption{{{_latex(table.caption)}}}"] if start == 0 else _CONTINUED
         yield from [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", *head]
-        for place in range(start, min(start + MAX_ROWS, len(rows))):
-            names = table.rows[place][:count]
-            if count and (place == start or names != table.rows[place - 1][:count]):
+        for place in range(start, end):
+            if count and (place == start or above[place] != above[place - 1]):
                 yield from [] if place == start else [r"\midrule"]
-                yield rf"\multicolumn{{{len(heads)}}}{{l}}{{{_latex(', '.join(names))}}} \\"
+                yield rf"\multicolumn{{{len(heads)}}}{{l}}{{{_latex(', '.join(above[place]))}}} \\"
             yield _latex_cells([_latex(cell) for cell in rows[place]])
         yield from [r"\bottomrule", r"\end{tabular}", r"\end{table*}"]
 
 
 _CONTINUED = (r"\addtocounter{table}{-1}", r"\caption{(continued)}")
+
+
+def _pages(above: Sequence[tuple[str, ...]]) -> list[int]:
+    """The rows with which pages begin; a block of rows with the same names above them takes a row more."""
+    starts, filled = [0], 0
+    for place, names in enumerate(above):
+        is_new = bool(names) and (place == 0 or names != above[place - 1])
+        if filled + 1 + is_new > MAX_ROWS:
+            starts, filled, is_new = [*starts, place], 0, bool(names)
+        filled += 1 + is_new
+    return starts
 
 
 def _leading(table: PrintedTable) -> int:
@@ -131,6 +143,14 @@ def with_interval(value: float, low: float, high: float, decimals: int) -> str:
         return "-"
     known = "" if math.isnan(low) else f" [{_signed(low, decimals)}, {_signed(high, decimals)}]"
     return _signed(value, decimals) + known
+
+
+def to_digits(value: float | None, low: float | None, high: float | None, digits: int) -> str:
+    """A number with its interval to some digits; a dash for one that is not known, ? for an end, None or nan both."""
+    ends = [None if end is None or math.isnan(end) else f"{float(f'{end:.{digits}g}'):g}" for end in (value, low, high)]
+    if ends[0] is None:
+        return "-"
+    return ends[0] if ends[1] is ends[2] is None else f"{ends[0]} [{ends[1] or '?'}, {ends[2] or '?'}]"
 
 
 def decimals_of(count: int) -> int:

@@ -109,6 +109,7 @@ def export(
         option("--format", "Default: parquet and csv of a study, csv of a run; may be repeated.", "csv|mat|parquet"),
     ] = None,
     table: Annotated[str | None, TABLE] = None,
+    metric: Annotated[str | None, option("--metric", "Metric whose medians in the cells are written too.")] = None,
 ) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies.store import store_path
@@ -116,19 +117,19 @@ def export(
     from orchestration.experiments.studies.table import of_run, of_study
 
     printed_tables.expect_format(table)
-    if what.is_dir() and table is not None:
-        raise UsageError(f"{what}: expected a study file with --table")
+    if what.is_dir() and (table, metric) != (None, None):
+        raise UsageError(f"{what}: expected a study file with --table and --metric")
     if what.is_dir() and not store_path("", what).is_file():
         return result_of_files(of_run(what, out or what, formats or ()))
     if what.is_dir():
         return result_of_files(of_study(store_path("", what), formats or ()))
     store, study = _current_store(what, out), load_study(what)
     if table is None:
-        return result_of_files(of_study(store, formats or (), study))
+        return result_of_files(of_study(store, formats or (), study, metric))
     from orchestration.command.study_table import study_table
 
-    printed = study_table(study, store)
-    written = of_study(store, formats or (), study)
+    printed = study_table(study, store, metric)
+    written = of_study(store, formats or (), study, metric)
     for path in written:
         inform(str(path))  # standard output is the table alone, for a file
     lines = list(printed_tables.lines(printed, table))

@@ -1,34 +1,45 @@
 """The cells of a study as a table for a paper, with intervals at 95 %."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestration.command.printed_tables import PrintedTable, decimals_of, with_interval
+from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
 from orchestration.experiments.studies.axes import name_of, quantity_of
-from orchestration.experiments.studies.shares import differences_of, laws_of, shares_of, with_chance
+from orchestration.experiments.studies.shares import (
+    differences_of,
+    differences_of_medians,
+    laws_of,
+    medians_of,
+    shares_of,
+    with_chance,
+)
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import frame, units_in
+from orchestration.experiments.studies.table import OF_CELLS, expect_medians, frame, units_in
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.requirements import is_number
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def study_table(study: Study, store: Path) -> PrintedTable:
-    """A row for each cell with its share of good runs; of two laws both shares and their difference side by side.
+def study_table(study: Study, store: Path, metric: str | None = None) -> PrintedTable:
+    """A row for each cell with its share of good runs, or the median of a metric over them.
 
-    The numbers are those of `shares.csv`. Raises `UsageError` for a study without repetitions.
+    Of two laws both stand side by side with their difference. The numbers are those of `shares.csv`, or of the file of
+    the medians. Raises `UsageError` for a study without repetitions, and for a metric that is none.
     """
     if study.cell_names is None:
-        raise UsageError("--table: expected a study whose design.repeat has the name of the axis that repeats, as seed")
+        raise UsageError(f"--table: {OF_CELLS}")
+    if metric is not None:
+        expect_medians(study, metric)
     rows, names = with_chance(frame(store), study), study.cell_names
-    shares, laws = shares_of(rows, names), laws_of(rows, names)
+    laws, units, word = laws_of(rows, names), units_in(store), study.origin.criterion.outcomes[0]
+    cells = shares_of(rows, names) if metric is None else medians_of(rows, names, metric)
     others = [axis for axis in study.cell_axes if laws is None or axis.name != laws.axis]
-    word, units = study.origin.criterion.outcomes[0], units_in(store)
     quantities = {axis.name: quantity_of(axis, units) for axis in others}
-    decimals = decimals_of(shares["count"].max())
-    first = shares if laws is None else shares[shares[laws.axis] == laws.first]
+    first = cells if laws is None else cells[cells[laws.axis] == laws.first]
     columns = {
         name_of(axis) if not all(map(is_number, first[axis.name])) else quantities[axis.name].title: [
             f"{quantities[axis.name].factor * value:g}" if is_number(value) else _short(str(value))
@@ -36,21 +47,32 @@ def study_table(study: Study, store: Path) -> PrintedTable:
         ]
         for axis in others
     }
-    caption = f"Share of {word} runs of {shares['count'].max()} in each cell, with 95 % Wilson intervals"
-    if laws is None:
-        columns[f"share {word}"] = _texts(shares, "share", decimals)
+    if metric is None:
+        texts = partial(_texts, column="share", decimals=decimals_of(cells["count"].max()))
+        caption = f"Share of {word} runs of {cells['count'].max()} in each cell, with 95 % Wilson intervals"
     else:
-        second = shares[shares[laws.axis] == laws.second]
+        texts = partial(_medians, column="median", count="good")
+        title = labels.metric_with_unit(metric, units.get(metric))
+        caption = f"Median of {title} over the {word} runs of each cell, with 95 % intervals of order statistics"
+        caption += " and, in parentheses, their number"
+    if laws is None:
+        columns[f"share {word}" if metric is None else "median"] = texts(cells)
+    else:
         by = [axis.name for axis in others]
-        for law, group in ((laws.first, first), (laws.second, second)):
-            columns[_short(law)] = _texts(first[by].merge(group, how="left", on=by), "share", decimals)
-        found = first[by].merge(differences_of(rows, names, laws), how="left", on=by)
-        columns["difference"] = _texts(found, "difference", decimals)
+        for law in (laws.first, laws.second):
+            columns[_short(law)] = texts(first[by].merge(cells[cells[laws.axis] == law], how="left", on=by))
         minus = f"{_short(laws.second)} minus {_short(laws.first)}"
-        caption += f"; difference: {minus}, with 95 % intervals by Newcombe's method for pairs"
-    if shares["low"].isna().any():
-        caption += "; no interval where nothing is random"
-    numbers = shares.astype(object).where(shares.notna(), None).to_dict("records")
+        if metric is None:
+            found, texts = differences_of(rows, names, laws), partial(texts, column="difference")
+            caption += f"; difference: {minus}, with 95 % intervals by Newcombe's method for pairs"
+        else:
+            found = differences_of_medians(rows, names, laws, metric)
+            texts = partial(texts, column="difference", count="pairs")
+            caption += f"; difference: median of {minus} over the pairs that are both {word}"
+        columns["difference"] = texts(first[by].merge(found, how="left", on=by))
+    if cells["low"].isna().any():
+        caption += "; no interval where nothing is random" + ("" if metric is None else ", or runs are too few")
+    numbers = cells.astype(object).where(cells.notna(), None).to_dict("records")
     return PrintedTable(caption=caption, heads=[*columns], rows=[*zip(*columns.values())], numbers=numbers)
 
 
@@ -61,3 +83,16 @@ def _short(law: str) -> str:
 def _texts(table: "pd.DataFrame", column: str, decimals: int) -> list[str]:
     """Values with their intervals, as far as they have one; a dash for a missing cell."""
     return [with_interval(*row, decimals) for row in zip(table[column], table["low"], table["high"])]
+
+
+def _medians(table: "pd.DataFrame", column: str, count: str) -> list[str]:
+    """Medians with their intervals and the number of runs; a dash where there are none."""
+    rows = zip(*(table[name] for name in (column, "low", "high", count)))
+    return [
+        f"{to_digits(value, low, high, DIGITS)} ({number:.0f})" if number > 0 else "-"
+        for value, low, high, number in rows
+    ]
+
+
+DIGITS = 3
+"""Digits of a median"""

@@ -31,8 +31,10 @@ if TYPE_CHECKING:
 
 HALF = 0.5
 """Share at which a map has its line"""
-MAX_TEXTS = 20
-"""Most columns of cells, over all panels, whose shares are written into them"""
+MAX_LETTERS = 120
+"""Most letters of a row of cells, over all panels, with a space after each: more do not fit into a figure"""
+OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{} • −"
+"""Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
 
 
 def cell_lines(
@@ -67,7 +69,9 @@ def cell_lines(
                 )  # fmt: skip
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
-    panel.set(xlabel=across.title, ylabel=_title(metric, words, units), xscale=SCALES[axis.scale])
+    panel.set(
+        xlabel=across.title, ylabel=_title(metric, words, units, numbered=metric != GOOD), xscale=SCALES[axis.scale]
+    )
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
     if laws is not None:
@@ -105,13 +109,15 @@ def cell_maps(
         panel.set_visible(False)
     grids = [{name: _grid(group, axes, name) for name in ("value", "share")} for _, group in groups]
     everything = np.stack([grid["value"] for grid in grids])
-    writes, repeats = (len(places[0]) - 1) * columns <= MAX_TEXTS, found["count"].max() > 1
+    room, most = MAX_LETTERS / columns / (len(places[0]) - 1), found["count"].max()
+    has_room = {form: len(form.format(most, most)) + 1 <= room for form in (OF_ALL, ALONE, MARKED)}
+    writes, repeats = has_room[ALONE], most > 1
     for panel, (law, group), grid in zip(panels, groups, grids):
         filled = _fill(panel, places, grid["value"], everything, metric)
         mesh.hatch(panel, *places, np.isnan(grid["share"]))
         _limit(panel, places, grid["share"])
         if metric == GOOD and writes:
-            _write_counts(panel, (x, y), axes, group)
+            _write_counts(panel, (x, y), axes, group, OF_ALL if has_room[OF_ALL] else ALONE)
         elif writes and repeats:
             _write_numbers(panel, (x, y), axes, group[group["good"] > 0].set_index(_names(*axes))["good"], 0.0)
         panel.set_title(law or "")
@@ -119,7 +125,7 @@ def cell_maps(
     for panel, none_good in zip(panels, empty):
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
     if filled is not None:
-        title = _title(metric, words, units, numbered=writes and repeats)
+        title = _title(metric, words, units, numbered=writes and repeats and not (metric == GOOD and has_room[OF_ALL]))
         figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
     if laws is not None and len(groups) == 2:
         first, second = map(str, laws.values or ())
@@ -131,8 +137,8 @@ def cell_maps(
             of = labels.metric_with_unit(
                 "median difference", units.get(metric) or labels.METRICS.get(metric, ("", None))[1]
             )
-            of += ", number of pairs" if writes and repeats else ""
-        _difference(figure, panels[2], places, axes, (x, y), of_pairs, of, writes=writes and repeats)
+            of += ",\nnumber of pairs" if has_room[MARKED] and repeats else ""
+        _difference(figure, panels[2], places, axes, (x, y), of_pairs, of, writes=has_room[MARKED] and repeats)
         panels[2].set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     for panel in panels[:count]:
         panel.set(xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale], xlabel=x.title)
@@ -196,12 +202,12 @@ def _has_limit(share: Floats) -> bool:
 
 
 def _write_counts(
-    panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], group: "pd.DataFrame"
+    panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], group: "pd.DataFrame", form: str
 ) -> None:
     x, y = (quantity.of(group[axis.name]) for quantity, axis in zip(quantities, axes))
     for across, up, good, count, share in zip(x, y, *(group[name] for name in ("good", "count", "share"))):
         color = "white" if share < HALF else BLACK
-        panel.text(across, up, f"{good}/{count}", color=color, ha="center", va="center", fontsize="x-small")
+        panel.text(across, up, form.format(good, count), color=color, ha="center", va="center", fontsize="x-small")
 
 
 def _write_numbers(
@@ -233,28 +239,30 @@ def _difference(
     size = 1.0 if is_share or not known.max(initial=0.0) else float(known.max())
     filled = mesh.fill(panel, *places, difference, cmap="RdBu", norm=Normalize(-size, size), vmin=None)
     figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85)
-    for row in found.to_dict("records"):  # the sign, which colours do not show in grey
+    marks = (found["low"] > 0.0) | (found["high"] < 0.0)
+    for row, is_marked in zip(found.to_dict("records"), marks):  # the sign, which colours do not show in grey
         if row["difference"]:
+            is_alone = not is_marked and (is_share or not writes)
             x, y = (float(quantity.of(row[axis.name])) for axis, quantity in zip(axes, quantities))
             color = "white" if abs(row["difference"]) > HALF * size else BLACK
             panel.annotate(
-                "+" if row["difference"] > 0.0 else "−", (x, y), (3.5, 0.0), textcoords="offset points", color=color,
-                ha="left", va="center",
+                "+" if row["difference"] > 0.0 else "−", (x, y), (0.0 if is_alone else 2.5, 0.0),
+                textcoords="offset points", color=color, ha="center" if is_alone else "left", va="center",
+                fontsize="small",
             )  # fmt: skip
     if not is_share and writes:
         _write_numbers(panel, quantities, axes, found.set_index(_names(*axes))["pairs"], 3.5)
-    marked = found[(found["low"] > 0.0) | (found["high"] < 0.0)]
+    marked = found[marks]
     if len(marked):
         places_of_dots = [quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes)]
         panel.plot(*places_of_dots, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
 
 
-def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool = True) -> str:
+def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool) -> str:
+    number = ", and their number" if numbered else ""
     if metric == GOOD:
-        return f"share of {words[0]} runs"
-    return f"median of {labels.metric_with_unit(metric, units.get(metric))}, where {words[0]}" + (
-        ", and their number" if numbered else ""
-    )
+        return f"share of {words[0]} runs{number}"
+    return f"median of {labels.metric_with_unit(metric, units.get(metric))},\nwhere {words[0]}{number}"
 
 
 def _repetitions(cells: "pd.DataFrame", metric: str) -> str:

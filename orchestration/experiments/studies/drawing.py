@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from fmu_kit.new_files import new_file, new_files
+from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
 from orchestration.experiments.studies.axes import Axis, unit_points
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
-from orchestration.experiments.studies.shares import GOOD, cells_of, differences_of_medians, laws_of, with_chance
+from orchestration.experiments.studies.shares import GOOD, with_chance
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -22,7 +22,6 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share, warn
 from orchestration.simulation.figures.style import SCREEN, Style, save
-from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.objectives import bound_of, judged_objective
 from orchestration.systems.system.requirements import is_number
 
@@ -49,7 +48,7 @@ def draw_study(
     """Draw a metric from the store of `study` in a folder, default: the first objective that varies; the paths.
 
     The figures are written to `out`, by default beside the store. With `design.repeat` the default is the share of good
-    runs; medians of another metric are written as CSV besides. Raises `UsageError` for an unknown metric, or axes for
+    runs. Raises `UsageError` for an unknown metric, or axes for
     which there is no figure.
     """
     path = store_path(study.name, folder)
@@ -57,26 +56,8 @@ def draw_study(
     place = path.parent if out is None else out
     with new_files(place) as new:
         tables = [sensitivity.write(indices, new / f"{next(iter(drawn))}.csv")] if indices else []
-        for name, table in _medians(study, path, metric).items():
-            with new_file(new / f"{name}_{metric}.csv") as file:
-                table.to_csv(file, index=False)
-            tables.append(new / f"{name}_{metric}.csv")
         written = [*tables, *save(drawn, new, style, progress)]
     return [place / each.name for each in written]
-
-
-def _medians(study: Study, store: Path, metric: str | None) -> "dict[str, pd.DataFrame]":
-    """The numbers of a figure of medians: those of the cells, and of two laws those of their difference, in pairs."""
-    if study.repeat is None or study.cell_names is None or metric in (None, GOOD):
-        return {}
-    table, names = with_chance(frame(store), study), study.cell_names
-    cells = cells_of(table, names, metric)
-    found = {"medians": cells.assign(median=cells.pop("value"))}
-    if (laws := laws_of(table, names)) is not None:
-        differences = differences_of_medians(table, names, laws, metric)
-        found["differences"] = differences.assign(law=laws.second, minus=laws.first)
-    unit = units_in(store).get(metric) or labels.METRICS.get(metric, ("", None))[1]
-    return {name: each.assign(unit=unit) for name, each in found.items()}
 
 
 def study_figures(

@@ -136,6 +136,31 @@ def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "
     return pd.DataFrame(rows, columns=[*others, "difference", "low", "high"])
 
 
+def medians_of(table: "pd.DataFrame", by: Sequence[str], metric: str) -> "pd.DataFrame":
+    """The median of a metric over the good runs of each cell.
+
+    Columns: the axes `by`, `good`, the number of those runs, `median`, and the interval of order statistics at 95 %,
+    `low` and `high`, nan where there are too few runs, and where nothing is random, which is one run.
+    """
+    import pandas as pd
+
+    done = table[table["status"] == "done"]
+    rows = []
+    for key, cell in done.groupby([*by]):
+        good = cell.loc[cell["good"].fillna(False).astype(bool) & cell[metric].notna(), metric]
+        rows.append((*key, *_median(good, is_random=bool(cell[RANDOM].any()))))
+    return pd.DataFrame(rows, columns=[*by, "good", "median", "low", "high"])
+
+
+def _median(values: "pd.Series", *, is_random: bool) -> tuple[int, float, float, float]:
+    """The number of values, their median, and the ends of its interval at 95 %."""
+    if not len(values):
+        return 0, math.nan, math.nan, math.nan
+    found = quantile(values.to_numpy(float))
+    low, high = (end if is_random and math.isfinite(end) else math.nan for end in (found.low, found.high))
+    return len(values) if is_random else 1, found.value, low, high
+
+
 def differences_of_medians(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws, metric: str) -> "pd.DataFrame":
     """The median of a metric of the second law minus that of the first, over the pairs in which both are good.
 
@@ -149,10 +174,8 @@ def differences_of_medians(table: "pd.DataFrame", by: Sequence[str], laws: TwoLa
     columns, rows = [*others, PAIR, metric, RANDOM], []
     one, other = (good.loc[good[laws.axis] == law, columns] for law in (laws.second, laws.first))
     for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others):
-        found = quantile((both[metric] - both[f"{metric}.other"]).to_numpy(float))
         is_random = bool((both[RANDOM] | both[f"{RANDOM}.other"]).any())
-        ends = (end if is_random and math.isfinite(end) else math.nan for end in (found.low, found.high))
-        rows.append((*key, len(both) if is_random else 1, found.value, *ends))
+        rows.append((*key, *_median(both[metric] - both[f"{metric}.other"], is_random=is_random)))
     return pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high"])
 
 

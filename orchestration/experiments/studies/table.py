@@ -11,11 +11,19 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from fmu_kit.new_files import new_files
-from orchestration.experiments.studies.shares import differences_of, laws_of, shares_of, with_chance
+from orchestration.experiments.studies.shares import (
+    GOOD,
+    differences_of,
+    differences_of_medians,
+    laws_of,
+    medians_of,
+    shares_of,
+    with_chance,
+)
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
-from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS
+from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS, metrics_with
 from orchestration.experiments.studies.study import Study
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.recording import mat_file
 from orchestration.simulation.runs.run_directory import MAT, load_run
@@ -121,32 +129,40 @@ def export(
     study: Study | None = None,
     *,
     rows: "pd.DataFrame | None" = None,
+    metric: str | None = None,
 ) -> list[Path]:
     """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
 
     `rows` are those of the store with columns of the caller, if any.
 
     Of a `study` with cells also the share of good runs of each as `shares`, likewise, and of two laws those of the
-    second minus those of the first, as `differences`. Parquet has units in the metadata of its fields, as `unit`; MAT
-    has a structure `runs` with a field for each column, and `units` with the same fields. Warns of runs by several
-    engines.
+    second minus those of the first, as `differences`; of a `metric` its medians, as `medians_METRIC`, and of two laws
+    those of its differences in pairs, as `differences_METRIC`. Parquet has units in the metadata of its fields, as
+    `unit`; MAT has a structure `runs` with a field for each column, and `units` with the same fields. Warns of runs by
+    several engines.
     """
     import pandas as pd
 
     rows = frame(path) if rows is None else rows
     if note := note_in(rows):
         warn(note)
-    tables = {"runs": rows}
+    tables, units = {"runs": rows}, units_in(path)
     if study is not None and study.cell_names is not None:
         cells, repeated = study.cell_names, with_chance(rows, study)
         tables["shares"] = shares_of(repeated, cells)
+        if metric is not None:
+            unit = units.get(metric, "")
+            tables[f"medians_{metric}"] = medians_of(repeated, cells, metric).assign(unit=unit)
         if (laws := laws_of(rows, cells)) is not None:
-            found = differences_of(repeated, cells, laws)
-            tables["differences"] = pd.DataFrame({"law": laws.second, "minus": laws.first, **found})
+            found = {"differences": differences_of(repeated, cells, laws)}
+            if metric is not None:
+                medians = differences_of_medians(repeated, cells, laws, metric)
+                found[f"differences_{metric}"] = medians.assign(unit=unit)
+            tables |= {n: pd.DataFrame({"law": laws.second, "minus": laws.first, **each}) for n, each in found.items()}
     written = []
     with new_files(folder) as new:
         for name, content in tables.items():
-            table = _with_units(pa.Table.from_pandas(content, preserve_index=False), units_in(path))
+            table = _with_units(pa.Table.from_pandas(content, preserve_index=False), units)
             for kind in formats:
                 _WRITERS[kind](table, new / f"{name}.{kind}")
                 written.append(folder / f"{name}.{kind}")
@@ -185,14 +201,28 @@ def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
     return [*written, *([result.to_mat(out / MAT)] if "mat" in formats else [])]
 
 
-def of_study(store: Path, formats: Sequence[str], study: Study | None = None) -> list[Path]:
+def of_study(store: Path, formats: Sequence[str], study: Study | None = None, metric: str | None = None) -> list[Path]:
     """Write the rows of a store beside it, default: as Parquet and CSV; the paths.
 
-    Of a `study` with cells also the share of good runs of each, with its interval.
+    Of a `study` with cells also the share of good runs of each, and the median of a `metric`, with intervals.
     """
     for kind in formats:
         _expect(kind, FORMATS)
-    return export(store, store.parent, formats or FORMATS[:2], study)
+    if metric is not None:
+        expect_medians(study, metric)
+    return export(store, store.parent, formats or FORMATS[:2], study, metric=metric)
+
+
+def expect_medians(study: Study | None, metric: str) -> None:
+    """Raise `UsageError` for a metric that is no number, and for a study without cells."""
+    if study is None or study.cell_names is None:
+        raise UsageError(f"--metric {metric}: {OF_CELLS}")
+    known = [name for name in metrics_with(study.metric_names) if name not in (*TEXTS, GOOD)]
+    if metric not in known:
+        raise UsageError(f"--metric {metric}: {expected_name(metric, known)}")
+
+
+OF_CELLS = "expected a study file whose design.repeat has the name of the axis that repeats, as seed"
 
 
 def _expect(kind: str, known: Sequence[str], hint: str = "") -> None:

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 import quadcosim
 from orchestration.command import study_table
 from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, decimals_of, lines, with_interval
-from orchestration.experiments.studies import drawing
+from orchestration.experiments.studies import cell_figures, drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
     PAIR,
@@ -22,6 +22,7 @@ from orchestration.experiments.studies.shares import (
     differences_of,
     differences_of_medians,
     interval_of_difference,
+    medians_of,
     with_chance,
 )
 from orchestration.experiments.studies.study import Study
@@ -139,6 +140,11 @@ def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good(
     )
     assert found["low"].isna().tolist() == [True, False], "three pairs do not bound a median"
     assert tuple(found.loc[(0.01, 0.2), ["low", "high"]]) == (0.0, 25.0)
+    medians = medians_of(table, names, "position_rmse").set_index(names).loc[laws.second, 0.01]
+    assert medians["good"].tolist() == [0, 3, 6]
+    assert medians["median"].tolist() == [pytest.approx(np.nan, nan_ok=True), 6.0, 19.0]
+    assert medians.loc[0.2, ["low", "high"]].tolist() == [0.0, 50.0]
+    assert medians.loc[0.1, ["low", "high"]].isna().all(), "three runs do not bound a median"
     exact = differences_of_medians(table.assign(random=False), names, laws, "position_rmse")
     assert exact["pairs"].tolist() == [1, 1]
     assert exact[["low", "high"]].isna().all(axis=None)
@@ -146,7 +152,7 @@ def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good(
                        (PERIODS, LOSSES), LAWS, "position_rmse", WORDS, units={"position_rmse": "m"})  # fmt: skip
     assert [text.get_text() for text in figure.axes[1].texts] == ["3", "6"]
     assert [text.get_text() for text in figure.axes[2].texts] == ["+", "+", "3", "6"]
-    assert [bar.get_xlabel() for bar in figure.axes[3:]][1] == "median difference [m], number of pairs"
+    assert [bar.get_xlabel() for bar in figure.axes[3:]][1] == "median difference [m],\nnumber of pairs"
     (marks,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
     assert np.asarray(marks.get_ydata()).tolist() == [0.2], "an interval that excludes 0"
 
@@ -190,6 +196,15 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     assert figure.get_suptitle() == (
         "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; dots: Newcombe's for pairs excludes 0"
     )
+
+
+def test_a_map_without_room_for_how_many_of_all_runs_are_good_has_the_good_ones_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cell_figures, "MAX_LETTERS", 2 * 2 * 3)
+    figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={})
+    assert [text.get_text() for text in figure.axes[1].texts] == ["0", "3", "6", "0", "0", "0"]
+    assert figure.axes[3].get_xlabel() == "share of settled runs, and their number"
 
 
 def test_the_numbers_of_two_colour_bars_side_by_side_do_not_touch() -> None:
@@ -258,17 +273,16 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     main("sweep", "study.toml", "--engine", "compiled")
     drawn = main("draw", "study.toml", "--out", "figures", "--format", "png").stdout.splitlines()
     assert drawn == ["figures/good.png"]
-    main("draw", "study.toml", "--store", "results/study/study.sqlite", "--out", "figures", "--format", "png")
-    drawn = main(
-        "draw", "study.toml", "--metric", "position_rmse", "--out", "figures", "--format", "png"
-    ).stdout.split()
-    assert drawn == [
-        "figures/medians_position_rmse.csv", "figures/differences_position_rmse.csv", "figures/position_rmse.png",
-    ]  # fmt: skip
-    medians = pd.read_csv(tmp_path / "figures/medians_position_rmse.csv")
-    assert list(medians)[-2:] == ["median", "unit"]
+    of_store = ("--store", "results/study/study.sqlite")
+    main("draw", "study.toml", *of_store, "--metric", "position_rmse", "--out", "figures", "--format", "png")
+    error = main("export", "study.toml", "--metric", "postion_rmse", code=2).stderr
+    assert "did you mean position_rmse?" in error
+    main("export", "study.toml", "--format", "csv", "--metric", "position_rmse")
+    medians = pd.read_csv(tmp_path / "results/study/medians_position_rmse.csv")
+    assert list(medians)[2:] == ["good", "median", "low", "high", "unit"]
     assert set(medians["unit"]) == {"m"}
-    main("export", "study.toml", "--format", "csv")
+    of_medians = pd.read_csv(tmp_path / "results/study/differences_position_rmse.csv")
+    assert list(of_medians)[3:] == ["pairs", "difference", "low", "high", "unit"]
     runs = pd.read_csv(tmp_path / "results/study/runs.csv")
     guids = {
         law: {quadcosim.read_model(fmu).description.guid for fmu in (law, f"native/{law}")}
@@ -332,7 +346,7 @@ def test_a_long_name_of_several_rows_stands_above_them_instead_of_in_a_column() 
 
 
 def test_a_table_of_more_rows_than_a_page_has_is_several_with_one_number_and_its_blocks_have_all_long_names() -> None:
-    rows = [["loss", law, str(i), "1.00"] for law in ("unified law, tuned", "cascade") for i in range(MAX_ROWS - 1)]
+    rows = [["loss", law, str(i), "1.00"] for law in ("unified law, tuned", "cascade") for i in range(MAX_ROWS - 3)]
     table = PrintedTable(caption="Many", heads=["condition", "law", "run", "share"], rows=rows, numbers=[])
     text = [*lines(table, "latex")]
     assert text[1] == r"\centering\footnotesize\setlength{\tabcolsep}{4pt}", "seven columns fit on a page"
