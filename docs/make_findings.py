@@ -116,7 +116,7 @@ def limits() -> Found:
     rows = []
     for kappa in KAPPAS:
         paper = PAPER.with_changes(parameters={"controller.coupling": kappa})
-        found = limit.find(paper, "period", progress=None, announce=None)
+        found = limit.limit(paper, "period", progress=None, announce=None)
         rows.append({"coupling": kappa, "local": found.local_limit, "settles": found.large_signal_limit,
                      "again": found.flies_above, "note": found.note})  # fmt: skip
         if kappa == 1.0:

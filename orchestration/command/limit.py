@@ -70,7 +70,7 @@ def limit(
 
     how = "auto" if engine == "auto" else engine_named(engine, "auto")
     request = request_from(scenario, flags, timing)
-    found = limits.find(
+    found = limits.limit(
         request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
         continuous=continuous, workers=workers, engine=how or "auto", announce=inform_in_passing,
     )  # fmt: skip

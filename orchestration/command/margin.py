@@ -84,9 +84,9 @@ def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
 
 
 def _region(request: "Request", of: str, and_of: str, out: Path | None) -> CommandResult:
-    from orchestration.theory.certificates.region import region
+    from orchestration.theory.certificates.region import margin_region
 
-    found = region(request, of, and_of, progress="bar")
+    found = margin_region(request, of, and_of, progress="bar")
     written = [] if out is None else found.save(out)
     for path in written:
         inform(str(path))
@@ -98,9 +98,9 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Comma
 
 
 def _checked(path: Path, request: "Request | None") -> CommandResult:
-    from orchestration.theory.certificates.check_file import check
+    from orchestration.theory.certificates.check_file import check_certificate
 
-    found = check(path, request)
+    found = check_certificate(path, request)
     lines = []
     for name, ranges in found.ranges.items():
         run = found.runs[name]

@@ -128,7 +128,7 @@ def _paused(chosen: "Request", pause_at: float, out: Path, figures: bool, how: A
     """None for a run that is paused in `out`; the result of one that ends before."""
     from orchestration.simulation.runs import pause
 
-    return pause.run_until(chosen, pause_at, out, figures=figures, **how)
+    return pause.fly_until(chosen, pause_at, out, figures=figures, **how)
 
 
 def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Result":

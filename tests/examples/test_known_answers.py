@@ -28,7 +28,7 @@ COMMAND_DELAY = "connections.command.delay"
 
 def limits(system: System, of: str, near: float, **options: Any) -> tuple[float, float]:
     """The results of `quadcosim limit` for a range around a value: the limit by runs, and the local one."""
-    found = limit.find(system, of, first=0.97 * near, last=1.03 * near, scan=0.03 * near, **options)
+    found = limit.limit(system, of, first=0.97 * near, last=1.03 * near, scan=0.03 * near, **options)
     assert found.large_signal_limit is not None
     assert found.local_limit is not None
     return found.large_signal_limit, found.local_limit

@@ -12,7 +12,7 @@ from fmpy.fmi2 import FMU2Model
 import quadcosim
 from fmu_kit.errors import FmuError
 from orchestration.components.building import fmus
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from plant_fmu.slave import RECALL, QuadrotorPlant
 from tests.fmus.expected import MEASUREMENT
 
@@ -146,7 +146,7 @@ def test_a_flight_by_both_engines_has_the_columns_of_steps_and_the_drop_is_an_ev
         assert rows[0].columns == steps.columns
         for of in ("position.x", "quaternion.w", "tilt"):
             assert rows[0].signals[f"plant.{of}"][-1] == pytest.approx(steps.signals[f"plant.{of}"][-1], abs=1e-4)
-    assert run_until(system(name, **exchange), 0.77, tmp_path / "paused", in_process=True) is None
+    assert fly_until(system(name, **exchange), 0.77, tmp_path / "paused", in_process=True) is None
     assert resume(tmp_path / "paused", in_process=True).rows.tobytes() == rows[1].rows.tobytes()
 
 

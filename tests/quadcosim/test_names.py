@@ -12,13 +12,14 @@ import orchestration
 import quadcosim
 from tests.places import ROOT
 
-CLASSES = [name for name in quadcosim.__all__ if inspect.isclass(getattr(quadcosim, name))]
+NAMES: list[str] = vars(quadcosim)["__all__"]
+CLASSES = [name for name in NAMES if inspect.isclass(getattr(quadcosim, name))]
 DATACLASSES = [name for name in CLASSES if dataclasses.is_dataclass(getattr(quadcosim, name))]
 
 
 def test_completion_finds_all_names_and_nothing_else() -> None:
-    assert dir(quadcosim) == sorted(quadcosim.__all__)
-    assert all(getattr(quadcosim, name) is not None for name in quadcosim.__all__)
+    assert dir(quadcosim) == sorted(NAMES)
+    assert all(getattr(quadcosim, name) is not None for name in NAMES)
 
 
 def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
@@ -27,8 +28,8 @@ def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
 
 
 def test_the_old_package_gives_the_same_objects() -> None:
-    names = [name for name in quadcosim.__all__ if not isinstance(getattr(orchestration, name), ModuleType)]
-    assert {*quadcosim.__all__} - {*names} <= {"report", "schedule"}
+    names = [name for name in NAMES if not isinstance(getattr(orchestration, name), ModuleType)]
+    assert {*NAMES} - {*names} <= {"report", "schedule"}
     assert all(getattr(orchestration, name) is getattr(quadcosim, name) for name in names)
 
 
@@ -39,7 +40,7 @@ def test_help_begins_with_a_way_in_and_has_every_class() -> None:
         assert f"class {name}(" in text
 
 
-@pytest.mark.parametrize("name", quadcosim.__all__)
+@pytest.mark.parametrize("name", NAMES)
 def test_everything_has_a_docstring_that_begins_with_a_sentence(name: str) -> None:
     first = inspect.getdoc(getattr(quadcosim, name)).partition("\n\n")[0]  # type: ignore[union-attr]
     assert first.endswith((".", ":"))

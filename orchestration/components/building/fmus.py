@@ -95,7 +95,7 @@ def locate(fmu: str, announce: Callable[[str], None] | None = None) -> Path:
     )
 
 
-def model_of(fmu: str | Path) -> "Model":
+def read_model(fmu: str | Path) -> "Model":
     """The variables and properties that an FMU declares, of its name or path; raises `UsageError` as `locate` does."""
     from orchestration.components.fmi.read_description import read_model  # not before: FMUs are built without it
 

@@ -40,7 +40,7 @@ def _loop(
 ) -> ControlLoop:
     fmu = comparison.fmu_of(controller)
     sets = {**comparison.parameters_for(vehicle, controller), **controller.sets, **dict(tuned)}
-    known = fmus.model_of(fmu).variables
+    known = fmus.read_model(fmu).variables
     sets |= {f"controller.{name}": 0.0 for name in _OF_THE_PERIOD if name in known}
     plant = comparison.base.as_system().fmus["plant"]
     return comparison.base.with_values(

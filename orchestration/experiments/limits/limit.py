@@ -36,7 +36,7 @@ CONTINUOUS = 1e-4
 
 
 @explains_missing
-def find(
+def limit(
     request: RequestLike,
     of: str | None = None,
     *,

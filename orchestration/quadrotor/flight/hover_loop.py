@@ -187,4 +187,4 @@ def _inertia(scenario: Scenario) -> float:
     name = "inertia.xx"
     if name in scenario.plant.parameters:
         return float(scenario.plant.parameters[name])
-    return float(fmus.model_of(scenario.plant.fmu).variables[name].start or 1.0)
+    return float(fmus.read_model(scenario.plant.fmu).variables[name].start or 1.0)

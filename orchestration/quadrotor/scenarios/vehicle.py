@@ -59,9 +59,9 @@ def _vehicle(name: str, tables: dict[str, Any]) -> Vehicle:
 
 def _expect_parameters(fmu: str, parameters: Mapping[str, Parameter], folder: Path) -> None:
     """Raise `UsageError` for an invalid parameter of a controller, also of one that this flight does not use."""
-    from orchestration.components.building.fmus import model_of  # not before: made where no FMU is read too
+    from orchestration.components.building.fmus import read_model  # not before: made where no FMU is read too
     from orchestration.systems.system.check import expect_parameter
 
-    model = model_of(str(folder / fmu) if fmu.endswith(PATHS) else fmu)
+    model = read_model(str(folder / fmu) if fmu.endswith(PATHS) else fmu)
     for name, value in parameters.items():
         expect_parameter(f"controllers.{fmu}.{name}", model, name, value)

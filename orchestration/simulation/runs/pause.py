@@ -27,7 +27,7 @@ from orchestration.systems.system.files import input_files
 from orchestration.systems.system.request import system_of
 
 
-def run_until(
+def fly_until(
     request: RequestLike,
     pause_at: float,
     out: str | Path,

@@ -26,7 +26,7 @@ class AnotherLoop(UsageError):
 
 
 @needs("flint")
-def check(path: str | Path, request: RequestLike | None = None) -> Checked:
+def check_certificate(path: str | Path, request: RequestLike | None = None) -> Checked:
     """Verify the certificate of a file, and, with a system, that its matrices are those of that system's loop.
 
     Raises `QuadcosimError` for a certificate that proves nothing, `UsageError` for a file that is none and for one of

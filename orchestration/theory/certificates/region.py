@@ -86,7 +86,7 @@ class Region:
 
 
 @needs("flint", "clarabel")
-def region(
+def margin_region(
     request: RequestLike, of: str, and_of: str, *, columns: int = COLUMNS, progress: ShareProgress = None
 ) -> Region:
     """How far two quantities of a system may vary at once, as `margin`; both are paths of times.

@@ -22,7 +22,7 @@ from orchestration.experiments.live.live import live
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.simulation.requests.one_fmu import alone
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion
@@ -180,7 +180,7 @@ def test_tasks_of_one_period_are_their_statements_in_one_step(parts: Path) -> No
 def test_tasks_are_paused_whole_and_have_limits(parts: Path, main: Main) -> None:
     file = onboard(parts, 0.01)
     whole = run(load_system(file), in_process=True)
-    assert run_until(load_system(file), 3.015, parts / "paused", in_process=True) is None  # between the two jobs
+    assert fly_until(load_system(file), 3.015, parts / "paused", in_process=True) is None  # between the two jobs
     assert resume(parts / "paused", in_process=True).rows.tobytes() == whole.rows.tobytes()
     (told,) = run(changed(load_system(parts / "two_tasks.toml"), {"components.speed.sampling.period": 0.1})).warnings
     assert told.startswith("speed (Pd): is sampled every 0.1 s, but its code believes 0.05 s")

@@ -15,7 +15,7 @@ from orchestration.foundation.basics.errors import QuadcosimError, SimulatorErro
 from orchestration.simulation.engines.resolved import resolve
 from orchestration.simulation.requests.request import request_of
 from orchestration.simulation.requests.ssp.export import export_of
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.period_map import growth_of_loop
@@ -94,7 +94,7 @@ def test_both_engines_and_a_process_give_the_same_rows(tmp_path: Path) -> None:
 def test_a_run_that_was_paused_has_the_same_bits_and_events(kind: str, at: float, tmp_path: Path) -> None:
     request = {"stop_time": 2.0, "components": {"it": {"fmu": str(exchange(tmp_path, kind)), "step": 0.11}}}
     whole = quadcosim.run(request, in_process=True)
-    assert run_until(request, at, tmp_path / "paused", in_process=True) is None
+    assert fly_until(request, at, tmp_path / "paused", in_process=True) is None
     resumed = resume(tmp_path / "paused", in_process=True)
     assert resumed.rows.tobytes() == whole.rows.tobytes()
     assert list(resumed.events) == list(whole.events)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
-from orchestration.experiments.limits.limit import find
+from orchestration.experiments.limits.limit import limit
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
@@ -69,7 +69,7 @@ def test_a_limit_is_measured_though_an_fmu_ends_the_process_of_the_local_one(tmp
         objectives={"last": "max(it.y)"},
         criterion=Criterion(good="last < 1"),
     )
-    found = find(
+    found = limit(
         system, "components.other.sampling.period", first=0.01, last=0.02, scan=0.01, progress=None, announce=None
     )
     assert [one.value for one in found.tried] == [0.01, 0.02]

@@ -11,7 +11,7 @@ from orchestration.components.fmi.read_description import read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.requests.request import request_of
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.proposal import propose
 from orchestration.theory.stability.period_map import growth_of_loop
@@ -81,7 +81,7 @@ def test_jitter_and_loss_apply_and_a_paused_run_goes_on(tmp_path: Path) -> None:
     assert one.rows.tobytes() == other.rows.tobytes()
     assert (one.signals["law.misused"][-1], one.signals["law.ticks"][-1]) == (0, 40)
     assert one.signals["law.slow_ticks"][-1] == 13  # at samples 2, 5 … 38
-    assert run_until(system, 7.33, tmp_path / "paused", in_process=True) is None
+    assert fly_until(system, 7.33, tmp_path / "paused", in_process=True) is None
     assert resume(tmp_path / "paused", in_process=True).rows.tobytes() == one.rows.tobytes()
 
 

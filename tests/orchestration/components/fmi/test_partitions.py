@@ -8,7 +8,7 @@ import pytest
 import quadcosim
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.systems.system.proposal import propose
 from tests.orchestration.components.fmi.exchange import clock, exchange, partitions
 from tests.orchestration.components.fmi.small import needs_compiler
@@ -56,7 +56,7 @@ def test_jobs_of_partitions_are_those_of_the_standards_example(tmp_path: Path) -
 def test_a_paused_run_of_partitions_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     system = ecu(tmp_path)
     whole = quadcosim.run(system, in_process=True)
-    assert run_until(system, 4.3, tmp_path / "paused", in_process=True) is None
+    assert fly_until(system, 4.3, tmp_path / "paused", in_process=True) is None
     assert resume(tmp_path / "paused", in_process=True).rows.tobytes() == whole.rows.tobytes()
 
 

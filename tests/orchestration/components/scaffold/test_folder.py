@@ -92,7 +92,7 @@ def test_a_plant_and_a_filter_run_good_and_have_a_limit(name: str, here: Path) -
     system = fmus.native_twins(load_system(here / name / "system.toml"))
     assert run(system).metrics["good"]
     of, first, last = LIMITS[name]
-    found = limit.find(system, of, first=first, last=last, scan=last - first, tolerance=last)
+    found = limit.limit(system, of, first=first, last=last, scan=last - first, tolerance=last)
     assert found.large_signal_limit == first
     if KINDS[name] == "plant":
         _expect_linear_theory(system)

@@ -18,7 +18,7 @@ import quadcosim
 from orchestration.components.fmi.reuse import Instances
 from orchestration.experiments.limits import limit as limits
 from orchestration.experiments.limits.evaluation import is_good
-from orchestration.experiments.limits.limit import as_text, find, shares_as_text
+from orchestration.experiments.limits.limit import as_text, shares_as_text
 from orchestration.experiments.limits.limit_result import ContinuousRun
 from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good, first_failure
 from orchestration.foundation.basics.simulator import Floats
@@ -493,7 +493,7 @@ def unseeded(system: System) -> System:
 @pytest.mark.usefixtures("stubbed")
 @pytest.mark.parametrize("tolerance", [None, 0.004, 1e-5])
 def test_the_large_signal_limit_is_the_last_good_value_to_the_tolerance(tolerance: float | None) -> None:
-    found = find(scenario_of(), "period", tolerance=tolerance)
+    found = limits.limit(scenario_of(), "period", tolerance=tolerance)
     assert found.tolerance == (tolerance or 0.0005)
     assert found.large_signal_limit is not None
     assert 0.0317 - found.tolerance <= found.large_signal_limit < 0.0317
@@ -501,7 +501,7 @@ def test_the_large_signal_limit_is_the_last_good_value_to_the_tolerance(toleranc
 
 def test_only_the_quantity_varies(stubbed: type[StubPool]) -> None:
     base = scenario_of(period=0.02)
-    found = find(base, "delay")
+    found = limits.limit(base, "delay")
     assert found.large_signal_limit == pytest.approx(0.0123, abs=0.0005)
     assert all(
         flown == base.with_changes(timing={"delay": at(flown, "timing.delay")}).as_system() for flown in stubbed.systems
@@ -510,7 +510,7 @@ def test_only_the_quantity_varies(stubbed: type[StubPool]) -> None:
 
 @pytest.mark.usefixtures("stubbed")
 def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_noted() -> None:
-    found = find(scenario_of(), "period")
+    found = limits.limit(scenario_of(), "period")
     assert found.local_limit == pytest.approx(0.080, abs=0.0005)
     assert "more than a tenth below the local limit" in found.note
     assert "by large signals or as small ones decay too slowly for the horizon" in found.note
@@ -520,18 +520,18 @@ def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
-    assert "within a tenth of the local limit" in find(scenario_of(), "period").note
+    assert "within a tenth of the local limit" in limits.limit(scenario_of(), "period").note
 
 
 def test_a_range_without_failures_or_without_good_values_is_noted(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01)
-    nothing_fails = find(scenario_of(), "jitter")
+    nothing_fails = limits.limit(scenario_of(), "jitter")
     assert nothing_fails.large_signal_limit is None
     assert "good throughout the scan" in nothing_fails.verdict
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0)
-    nothing_good = find(scenario_of(), "delay")
+    nothing_good = limits.limit(scenario_of(), "delay")
     assert nothing_good.large_signal_limit is None
     assert "not good even at 0 s, where the scan begins" in nothing_good.verdict
 
@@ -545,7 +545,7 @@ def test_random_quantities_take_enough_seeds_for_nine_in_ten_at_the_confidence(
     stubbed: type[StubPool], of: str, timing: dict[str, Any], confidence: float, seeds: int
 ) -> None:
     base = dataclasses.replace(scenario_of(**timing), seed=5)
-    found = find(base, of, confidence=confidence)
+    found = limits.limit(base, of, confidence=confidence)
     assert (found.seeds, found.confidence) == (seeds, confidence)
     assert 0.9**seeds <= 1.0 - confidence < 0.9 ** (seeds - 1)  # the success run
     flown = [[one.seed for one in group] for _, group in itertools.groupby(stubbed.systems, key=unseeded)]
@@ -558,7 +558,7 @@ def test_one_seed_that_is_not_good_is_enough_to_fail(stubbed: type[StubPool], mo
         return 1.0 if system.seed == 28 and at(system, "timing.loss") > 0.222 else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
-    found = find(scenario_of(), "loss")
+    found = limits.limit(scenario_of(), "loss")
     assert found.large_signal_limit == pytest.approx(0.222, abs=0.01)
     assert found.local_limit is None
     assert "linear theory has no local limit of loss" in found.note
@@ -569,13 +569,13 @@ def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monke
         return 1.0 if 0.0317 < at(system, "timing.period") < 0.042 else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
-    found = find(scenario_of(), "period")
+    found = limits.limit(scenario_of(), "period")
     assert found.large_signal_limit == pytest.approx(0.0317, abs=0.0005)
     assert found.flies_above == (0.045, 0.05, 0.055)
     assert [one.value for one in found.tried if one.value >= 0.035] == [0.035, 0.04, 0.045, 0.05, 0.055]
     assert found.scan == 0.005
     assert "narrower than the scan, 5 ms, is not seen" in found.note
-    coarse = find(scenario_of(), "period", scan=0.05)
+    coarse = limits.limit(scenario_of(), "period", scan=0.05)
     assert (coarse.scan, coarse.large_signal_limit) == (0.05, None), "as its help says, it sees no gap that small"
 
 
@@ -586,7 +586,7 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
         return 0.01 if 0.0062 < at(system, "timing.period") < 0.0317 else math.inf
 
     monkeypatch.setattr(stubbed, "bound", bound)
-    found = find(scenario_of(), "period")
+    found = limits.limit(scenario_of(), "period")
     assert found.verdict == (
         "period good from 6.25 ms up to 31.5 ms; diverges at 31.75 ms; diverges at 6 ms (scan 5 ms, tolerance 0.5 ms)"
     )
@@ -594,7 +594,7 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
     assert (
         "scanned from 5 ms to 55 ms, as a search ends soon after what fails: beyond that nothing is known" in found.note
     )
-    from_below = find(scenario_of(), "period", first=0.005)
+    from_below = limits.limit(scenario_of(), "period", first=0.005)
     assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (None, None)
     assert from_below.verdict.startswith("period not good even at 5 ms, where the scan begins: diverged; good again at")
 
@@ -607,7 +607,7 @@ def test_the_outcome_of_the_failing_value_is_in_the_verdict(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch, bound: float, expected: str
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.03 else bound)
-    found = find(scenario_of(), "period")
+    found = limits.limit(scenario_of(), "period")
     assert expected in found.verdict
     assert found.horizon == 30.0
 
@@ -619,7 +619,7 @@ def test_the_value_at_which_nine_in_ten_is_refuted_is_noted_with_its_interval(
         return 1.0 if system.seed % 29 < 100.0 * (at(system, "timing.loss") - 0.26) else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
-    found = find(scenario_of(), "loss")
+    found = limits.limit(scenario_of(), "loss")
     assert found.large_signal_limit == pytest.approx(0.26, abs=0.01)
     assert found.refuted_limit == pytest.approx(0.32, abs=0.011)  # 6 failures of 29 are not enough, 7 are
     by_value = {one.value: one for one in found.tried}[found.refuted_limit or 0.0]
@@ -642,7 +642,7 @@ def test_a_value_at_which_only_some_seeds_are_good_is_not_reported_as_good_above
         return 1.0 if loss > 0.5 or (0.2 < loss < 0.42 and system.seed % 29 == 3) else 0.01
 
     monkeypatch.setattr(stubbed, "bound", bound)
-    found = find(scenario_of(), "loss")
+    found = limits.limit(scenario_of(), "loss")
     some = [one.value for one in found.tried if 0 < one.flew < one.runs == found.seeds]
     assert found.large_signal_limit == pytest.approx(0.2, abs=0.01)
     assert some
@@ -655,7 +655,7 @@ def test_the_interval_of_a_share_is_at_the_requested_confidence(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0 if at(system, "timing.loss") > 0.3 else 0.01)
-    found = find(scenario_of(), "loss", confidence=0.5)
+    found = limits.limit(scenario_of(), "loss", confidence=0.5)
     shares = {one.share for one in found.tried if one.flew == found.seeds}
     assert shares == {wilson(found.seeds, found.seeds, 0.5)}
     assert wilson(found.seeds, found.seeds, 0.5) != wilson(found.seeds, found.seeds)
@@ -665,7 +665,7 @@ def test_a_first_value_that_fails_for_some_seeds_may_still_be_good_for_nine_in_t
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0 if system.seed == 3 else 0.01)
-    found = find(scenario_of(), "loss")
+    found = limits.limit(scenario_of(), "loss")
     assert (found.large_signal_limit, found.refuted_limit) == (None, None)
     assert found.tried[0].share == wilson(28, 29)
 
@@ -675,32 +675,32 @@ def test_near_continuous_time_no_digital_effects_remain(stubbed: type[StubPool])
         period=0.02, delay=0.005, command_loss=0.1, hold="first", order="jacobi", noise={"position": 0.1}
     )
     base = base.with_changes(parameters={"plant.mass": 1.0, "plant.actuator_time_constant": 0.02})
-    found = find(base, "delay", continuous=True)
+    found = limits.limit(base, "delay", continuous=True)
     (ideal,) = [flown for flown in stubbed.systems if at(flown, "timing.period") == 1e-4]
     clear = dataclasses.replace(
         base, timing=Timing(period=1e-4, plant_interval=0.02), record=Record(plant=(), controller=())
     )
     assert ideal == clear.as_system()
     assert found.continuous == ContinuousRun(period=1e-4, outcome="settled", settling_time=1.5)
-    assert find(base, "delay").continuous is None
+    assert limits.limit(base, "delay").continuous is None
 
 
 def test_the_limit_at_the_edge_of_the_boundary_layer_stands_beside_the_other(stubbed: type[StubPool]) -> None:
     del stubbed
-    found = find(scenario_of().with_changes(parameters={"controller.surface_exponent": 0.5}), "period")
+    found = limits.limit(scenario_of().with_changes(parameters={"controller.surface_exponent": 0.5}), "period")
     assert (found.local_limit, found.local_limit_outside) == pytest.approx((0.0801, 0.0085), abs=1e-4)
 
 
 @pytest.mark.usefixtures("stubbed")
 def test_where_nothing_is_random_one_run_decides_and_there_is_no_confidence() -> None:
-    found = find(scenario_of(), "period")
+    found = limits.limit(scenario_of(), "period")
     assert (found.seeds, found.confidence) == (1, None)
 
 
 @pytest.mark.usefixtures("stubbed")
 def test_each_value_is_announced() -> None:
     lines: list[str] = []
-    find(scenario_of(), "period", announce=lines.append)
+    limits.limit(scenario_of(), "period", announce=lines.append)
     assert lines[0] == "engine compiled: native FMUs, one run at a time"
     assert lines[1] == "period 10 ms: settled"
     assert "period 1 ms: settled" in lines
@@ -712,7 +712,7 @@ def test_each_value_is_announced() -> None:
 @pytest.mark.parametrize("of", ["period", "jitter"])
 def test_progress_is_a_share_of_the_longest_search_and_reaches_one(of: str) -> None:
     shares: list[float] = []
-    found = find(scenario_of(), of, progress=shares.append)
+    found = limits.limit(scenario_of(), of, progress=shares.append)
     assert len(shares) > len(found.tried)
     assert 0.0 < shares[0] < 0.1
     assert all(0.0 < share <= 1.0 for share in shares)
@@ -721,7 +721,7 @@ def test_progress_is_a_share_of_the_longest_search_and_reaches_one(of: str) -> N
 
 @pytest.mark.usefixtures("stubbed")
 def test_a_mass_mismatch_has_no_local_limit_with_the_reason_noted() -> None:
-    found = find(scenario_of().with_changes(parameters={"controller.mass": 1.1}), "period")
+    found = limits.limit(scenario_of().with_changes(parameters={"controller.mass": 1.1}), "period")
     assert found.local_limit is None
     assert found.large_signal_limit is not None
     assert "hover is no equilibrium" in found.note
@@ -731,7 +731,7 @@ def test_a_mass_mismatch_has_no_local_limit_with_the_reason_noted() -> None:
 def test_find_runs_the_scenario_and_its_result_is_json() -> None:
     base = dataclasses.replace(hover_of(short(stop_time=2.0, plant_interval=0.01)), stop_time=2.0)
     base = base.with_changes(parameters={"plant.initial.position.x": 0.005})
-    found = find(base, "period", tolerance=0.02)
+    found = limits.limit(base, "period", tolerance=0.02)
     fields = json.loads(json.dumps(dataclasses.asdict(found)))
     assert fields.keys() == {
         "of", "unit", "judged", "judged_unit", "judged_bound", "local_limit", "local_method", "local_accuracy",
@@ -756,7 +756,7 @@ def test_find_runs_the_scenario_and_its_result_is_json() -> None:
 @pytest.mark.parametrize("workers", sample([1, 2], 1))
 def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(workers: int) -> None:
     base = dataclasses.replace(hover_of(short()), stop_time=0.05)
-    found = find(base, "loss", confidence=0.2, scan=0.25, tolerance=0.5, workers=workers)
+    found = limits.limit(base, "loss", confidence=0.2, scan=0.25, tolerance=0.5, workers=workers)
     assert (found.seeds, found.large_signal_limit) == (3, None)
     assert "good throughout the scan, up to 1" in found.verdict
 
@@ -780,5 +780,5 @@ def test_invalid_requests_are_refused_before_any_run(
 ) -> None:
     stubbed.systems = []
     with pytest.raises(UsageError, match=expected):
-        find(scenario_of(), **{"of": "period", **options})
+        limits.limit(scenario_of(), **{"of": "period", **options})
     assert stubbed.systems == []

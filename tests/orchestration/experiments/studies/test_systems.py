@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from orchestration.components.fmi.reuse import Instances
-from orchestration.experiments.limits.limit import find
+from orchestration.experiments.limits.limit import limit
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.studies.drawing import draw_study
 from orchestration.experiments.studies.store import open_for_reading, store_path
@@ -250,7 +250,7 @@ def test_a_point_that_is_not_at_rest_is_refused_naming_what_moves(system: System
 
 def test_the_largest_period_of_the_double_integrator_is_two_seconds(system: System) -> None:
     long = dataclasses.replace(system, stop_time=100.0)
-    found = find(long, PERIOD, first=1.8, last=2.2, scan=0.1, tolerance=0.02)
+    found = limit(long, PERIOD, first=1.8, last=2.2, scan=0.1, tolerance=0.02)
     assert found.local_limit == pytest.approx(2.0, abs=0.0002)
     assert found.local_accuracy == pytest.approx(0.0002)
     assert found.local_method is not None
@@ -261,7 +261,7 @@ def test_the_largest_period_of_the_double_integrator_is_two_seconds(system: Syst
 
 def test_without_an_operating_point_there_is_no_local_limit_with_the_reason_noted(system: System) -> None:
     nowhere = dataclasses.replace(system, operating_point={}, stop_time=5.0)
-    found = find(nowhere, K_D, first=1.0, last=2.0, scan=1.0)
+    found = limit(nowhere, K_D, first=1.0, last=2.0, scan=1.0)
     assert (found.local_limit, found.local_method) == (None, None)
     assert "the system file names no operating_point" in found.note
 
@@ -289,13 +289,13 @@ def test_invalid_requests_for_a_system_are_refused_in_one_line(
     system: System, options: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(UsageError) as caught:
-        find(system, **options)
+        limit(system, **options)
     assert said in one_line(caught.value)
 
 
 def test_a_system_without_a_criterion_has_no_limit(system: System) -> None:
     with pytest.raises(UsageError, match=r"criterion.good: expected in the system file"):
-        find(dataclasses.replace(system, criterion=Criterion()), DELAY, first=0.0, last=1.0)
+        limit(dataclasses.replace(system, criterion=Criterion()), DELAY, first=0.0, last=1.0)
 
 
 def test_the_command_prints_the_limit_of_a_path_as_json(main: Main) -> None:

@@ -12,7 +12,7 @@ from orchestration.quadrotor.flight.names import FIGURES as FLIGHT
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.runs import draw as drawn
 from orchestration.simulation.runs.draw import draw
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.run_directory import keep_run
 from quadcosim import Result, Timing, load_run
 from tests.native import native
@@ -95,7 +95,7 @@ def test_rows_are_on_disk_before_the_flight_is_over(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("at", [0.01, 0.2, 0.4])
 def test_a_pause_between_chunks_changes_nothing(at: float, whole: Result, tmp_path: Path) -> None:
-    run_until(SCENARIO, at, tmp_path / "paused")
+    fly_until(SCENARIO, at, tmp_path / "paused")
     expect_equal(resume(tmp_path / "paused", tmp_path / "done", figures=False), whole)
     expect_equal(resume(tmp_path / "paused"), whole)
 

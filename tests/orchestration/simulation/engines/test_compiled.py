@@ -33,7 +33,7 @@ from orchestration.simulation.engines import compiled
 from orchestration.simulation.engines.memory import SharedTables
 from orchestration.simulation.runs import simulation
 from orchestration.simulation.runs.outcome import RunInterrupted
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule import instant_arrays
@@ -320,7 +320,7 @@ def test_examples_run_the_same(path: Path) -> None:
 @pytest.mark.parametrize(("first", "then"), [("python", "compiled"), ("compiled", "python"), ("compiled", "compiled")])
 def test_a_run_that_one_engine_pauses_another_ends(first: Any, then: Any, fmu: Path, tmp_path: Path) -> None:
     system = of(LOOP, fmu)
-    assert run_until(system, 0.4, tmp_path / "paused", engine=first, figures=False) is None
+    assert fly_until(system, 0.4, tmp_path / "paused", engine=first, figures=False) is None
     assert_the_same(resume(tmp_path / "paused", engine=then), ran(system, "python"))
 
 

@@ -14,7 +14,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.recording.recording import KINDS
 from orchestration.simulation.engines.batch.batches import Batches
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.run_directory import load_run
 from orchestration.systems.schedule import instant_arrays
 from orchestration.systems.schedule.resources import timeline_of
@@ -210,7 +210,7 @@ def test_a_run_tells_what_becomes_of_tasks_and_frames_beside_messages_and_so_do_
     monkeypatch.setattr("orchestration.simulation.engines.backlog.ROWS", 30)  # before the pause chunks are handed over
     what = loop(fmu, Component(fmu="stub"), computers=CROWDED, networks=BUS)
     messages = [x.name for x in what.connections]
-    assert run_until(what, 0.6, tmp_path / "half", engine=engine, in_process=True) is None
+    assert fly_until(what, 0.6, tmp_path / "half", engine=engine, in_process=True) is None
     resume(tmp_path / "half", tmp_path / "whole", engine=engine, in_process=True)
     events = load_run(tmp_path / "whole").events
     assert events == ran(what, engine).events

@@ -13,7 +13,7 @@ import pytest
 import quadcosim
 from orchestration.components.building import fmus
 from orchestration.quadrotor.scenarios.wiring import REFERENCE
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.result import Result
 from quadcosim import ReferenceChoice, Timing, UsageError
 from tests.native import native
@@ -54,7 +54,7 @@ def equal(a: Result, b: Result) -> bool:
 @pytest.mark.parametrize("at", [0.0, 0.1234, 0.2])
 def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(timing: Timing, at: float, tmp_path: Path) -> None:
     scenario = native(stop_time=0.4, timing=timing, seed=3).with_changes(parameters=LAGGING)
-    assert run_until(scenario, at, tmp_path / "paused") is None
+    assert fly_until(scenario, at, tmp_path / "paused") is None
     resumed = resume(tmp_path / "paused")
     whole = quadcosim.run(scenario)
     assert equal(resumed, whole)
@@ -63,7 +63,7 @@ def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(timing: Timing, at: 
 
 def test_a_paused_run_goes_on_in_another_process(tmp_path: Path) -> None:
     scenario = native(stop_time=0.3, timing=EVERYTHING)
-    run_until(scenario, 0.15, tmp_path / "paused")
+    fly_until(scenario, 0.15, tmp_path / "paused")
     code = "import sys, orchestration as q; q.save_run(q.resume(sys.argv[1]), sys.argv[2], figures=False)"
     subprocess.run([sys.executable, "-c", code, tmp_path / "paused", tmp_path / "done"], check=True)
     assert equal(quadcosim.load_run(tmp_path / "done"), quadcosim.run(scenario))
@@ -71,14 +71,14 @@ def test_a_paused_run_goes_on_in_another_process(tmp_path: Path) -> None:
 
 def test_a_run_that_diverges_before_the_pause_is_over(tmp_path: Path) -> None:
     diverging = native(stop_time=5.0, timing=Timing(period=0.3))
-    result = run_until(diverging, 4.0, tmp_path / "paused", figures=False)
+    result = fly_until(diverging, 4.0, tmp_path / "paused", figures=False)
     assert result is not None
     assert result.metrics["diverged"] is True
     assert quadcosim.load_run(tmp_path / "paused").rows.tobytes() == result.rows.tobytes()
 
 
 def test_other_fmus_than_those_of_the_pause_are_refused(tmp_path: Path) -> None:
-    run_until(native(stop_time=0.1).with_fmus(**own(tmp_path)), 0.05, tmp_path / "paused")
+    fly_until(native(stop_time=0.1).with_fmus(**own(tmp_path)), 0.05, tmp_path / "paused")
     with zipfile.ZipFile(tmp_path / "UnifiedController.fmu", "a") as fmu:
         fmu.writestr("resources/more.txt", "more")  # its GUID stays
     with pytest.raises(UsageError, match=r"the FMU of controller has changed since the run was paused"):
@@ -87,7 +87,7 @@ def test_other_fmus_than_those_of_the_pause_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("edit", [("period = 0.01", "period = 0.02"), ("seed = 0", "seed = 1")], ids=str)
 def test_another_scenario_than_that_of_the_pause_is_refused(edit: tuple[str, str], tmp_path: Path) -> None:
-    run_until(native(stop_time=0.1), 0.05, tmp_path / "paused")
+    fly_until(native(stop_time=0.1), 0.05, tmp_path / "paused")
     file = tmp_path / "paused" / "scenario.toml"
     assert edit[0] in file.read_text()
     file.write_text(file.read_text().replace(*edit))
@@ -100,7 +100,7 @@ def test_another_reference_than_that_of_the_pause_is_refused(tmp_path: Path) -> 
     table = tmp_path / "reference.csv"
     table.write_text("\n".join([",".join(("time", *REFERENCE)), "0" + ",0" * 15, "1" + ",0" * 15]))
     scenario = native(stop_time=0.1, reference=ReferenceChoice(file=table))
-    run_until(scenario, 0.05, tmp_path / "paused")
+    fly_until(scenario, 0.05, tmp_path / "paused")
     table.write_text(table.read_text() + "\n2" + ",0" * 15)
     with pytest.raises(UsageError, match="the file of reference has changed since the run was paused"):
         resume(tmp_path / "paused")
@@ -110,17 +110,17 @@ def test_another_reference_than_that_of_the_pause_is_refused(tmp_path: Path) -> 
 def test_a_pause_replaces_nothing(paused: bool, tmp_path: Path) -> None:
     scenario = native(stop_time=0.1)
     if paused:
-        run_until(scenario, 0.05, tmp_path / "there")
+        fly_until(scenario, 0.05, tmp_path / "there")
     else:
         quadcosim.save_run(quadcosim.run(scenario), tmp_path / "there", figures=False)
     before = contents(tmp_path / "there")
     with pytest.raises(UsageError, match=r"there: expected a new or empty directory$"):
-        run_until(scenario, 0.05, tmp_path / "there")
+        fly_until(scenario, 0.05, tmp_path / "there")
     assert contents(tmp_path / "there") == before
 
 
 def test_a_paused_run_is_replaced_by_its_own_end_only(tmp_path: Path) -> None:
-    run_until(native(stop_time=0.1), 0.05, tmp_path / "paused")
+    fly_until(native(stop_time=0.1), 0.05, tmp_path / "paused")
     before = contents(tmp_path / "paused")
     with pytest.raises(UsageError, match="expected a new or empty directory, or that of an earlier run"):
         quadcosim.save_run(quadcosim.run(native(stop_time=0.1)), tmp_path / "paused")
@@ -132,7 +132,7 @@ def test_a_paused_run_is_replaced_by_its_own_end_only(tmp_path: Path) -> None:
 @pytest.mark.parametrize("at", [-0.1, 0.1, 1.0])
 def test_a_pause_outside_the_run_is_refused(at: float, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="pause at"):
-        run_until(native(stop_time=0.1), at, tmp_path / "paused")
+        fly_until(native(stop_time=0.1), at, tmp_path / "paused")
 
 
 def test_a_folder_without_a_pause_is_refused(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_a_folder_without_a_pause_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("part", ["instants", "of", "row", "events", "plant"])
 def test_a_state_that_has_been_edited_is_refused_in_one_line(part: str, tmp_path: Path) -> None:
-    run_until(native(stop_time=0.1), 0.05, tmp_path / "paused")
+    fly_until(native(stop_time=0.1), 0.05, tmp_path / "paused")
     path = tmp_path / "paused" / "paused.npz"
     with np.load(path) as archive:
         arrays = dict(archive)

@@ -18,7 +18,7 @@ from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.processes import subprocesses
 from orchestration.simulation.runs import run_in_process
 from orchestration.simulation.runs.outcome import RunInterrupted, RunLost
-from orchestration.simulation.runs.pause import resume, run_until
+from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.run_directory import load_run
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.component import Component
@@ -274,7 +274,7 @@ def test_ctrl_c_ends_the_run_at_an_instant_and_keeps_its_rows(tmp_path: Path) ->
 def test_a_run_is_paused_and_resumed_in_processes_of_their_own(tmp_path: Path) -> None:
     system = beside(small(tmp_path), small(tmp_path))
     whole = run(system, in_process=True)
-    assert run_until(system, 0.05, tmp_path / "paused", figures=False) is None
+    assert fly_until(system, 0.05, tmp_path / "paused", figures=False) is None
     result = resume(tmp_path / "paused")
     assert np.array_equal(result.rows, whole.rows)
     assert result.events == whole.events

@@ -12,7 +12,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates import basin as module
 from orchestration.theory.certificates.basin import Basin, basin, largest_basin
-from orchestration.theory.certificates.check_file import check
+from orchestration.theory.certificates.check_file import check_certificate
 from orchestration.theory.certificates.family import Letter
 from orchestration.theory.certificates.verify_certificate import NotProven
 from tests.examples.common import example
@@ -64,7 +64,7 @@ def test_more_than_the_set_is_not_proved(tmp_path: Path) -> None:
     found = double_integrator(1.0)
     file = tmp_path / "basin.json"
     file.write_text(found.certificate, encoding="utf-8")
-    assert check(file).states == 2
+    assert check_certificate(file).states == 2
     with pytest.raises(NotProven, match="may exceed the limit"):
         module._expect_within(np.linalg.cholesky(found.P).T / 1.01, found.H, 1.0)
 

@@ -23,10 +23,10 @@ from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates.breaking import unstable_sequence
 from orchestration.theory.certificates.causes import ScheduledLoop, cause_at
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
-from orchestration.theory.certificates.check_file import AnotherLoop, check
+from orchestration.theory.certificates.check_file import AnotherLoop, check_certificate
 from orchestration.theory.certificates.find_certificate import find_certificate
 from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin
-from orchestration.theory.certificates.region import region
+from orchestration.theory.certificates.region import margin_region
 from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.exact.loops import Loops
 from tests.examples.common import example
@@ -111,19 +111,19 @@ def test_what_is_certified_dies_out_whatever_the_logger_takes(found: Certified) 
 
 def test_a_certificate_says_up_to_which_value_it_is_one_of_a_system(found: Certified, tmp_path: Path) -> None:
     path = found.save(tmp_path / "certificate.json")
-    assert check(path).up_to is None
-    own = check(path, on_a_computer())
+    assert check_certificate(path).up_to is None
+    own = check_certificate(path, on_a_computer())
     assert own.of == (LOGGER,)
     assert own.up_to == found.certified
     for other in ({"execution": 0.05}, {"period": 1.01}, {"read": "release"}):
         with pytest.raises(AnotherLoop):
-            check(path, on_a_computer(control=other))
+            check_certificate(path, on_a_computer(control=other))
 
 
 def test_more_urgent_tasks_that_do_not_vary_leave_less(found: Certified, tmp_path: Path) -> None:
     """Of the same windows: what another task takes counts as what the logger may take."""
     urgent = on_a_computer({"urgent": Task(period=1.0, execution=0.03, priority=1)})
-    less = check(found.save(tmp_path / "certificate.json"), urgent)
+    less = check_certificate(found.save(tmp_path / "certificate.json"), urgent)
     assert less.up_to == pytest.approx((found.certified or 0.0) - 0.03, abs=2e-9)
 
 
@@ -174,7 +174,7 @@ def test_where_nothing_is_made_late_all_that_is_looked_at_is_certified(tmp_path:
     assert found.certified == found.largest == pytest.approx(0.1, abs=1e-3)
     assert found.breaking is not None
     assert found.breaking > found.largest
-    assert check(found.save(tmp_path / "certificate.json"), logical).up_to == found.largest
+    assert check_certificate(found.save(tmp_path / "certificate.json"), logical).up_to == found.largest
 
 
 def test_a_sequence_that_breaks_a_loop_does_so_where_it_is_a_trace(tmp_path: Path) -> None:
@@ -206,7 +206,7 @@ def test_of_frames_before_the_command_the_jitter_is_certified(monkeypatch: pytes
     monkeypatch.setattr(certificates, "SHARES", (0.5,))
     found = margin(on_a_bus(), "networks.bus.messages.status.jitter")
     assert (found.certified, found.breaking, found.searched) == (0.5 * found.largest, None, "no sequences")
-    up_to = check(found.save(tmp_path / "certificate.json"), on_a_bus()).up_to
+    up_to = check_certificate(found.save(tmp_path / "certificate.json"), on_a_bus()).up_to
     assert up_to is not None
     assert found.certified <= up_to < found.largest  # as no other value would make the command later
 
@@ -226,7 +226,7 @@ def test_a_delay_of_what_a_scheduler_delays_is_refused_for_its_cause() -> None:
     with pytest.raises(UsageError, match=r"^networks\.bus\.messages\.command: .* of the jitter of one"):
         margin(on_a_bus(), COMMAND)
     with pytest.raises(UsageError, match="as a cause"):
-        region(on_a_computer(), COMMAND, "connections.measurement.delay_jitter")
+        margin_region(on_a_computer(), COMMAND, "connections.measurement.delay_jitter")
 
 
 def test_two_components_that_are_late_are_refused() -> None:

@@ -18,10 +18,10 @@ from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates import region as regions
 from orchestration.theory.certificates.breaking import breaking_at
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
-from orchestration.theory.certificates.check_file import check
+from orchestration.theory.certificates.check_file import check_certificate
 from orchestration.theory.certificates.find_certificate import find_certificate, parts_of
 from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
-from orchestration.theory.certificates.region import region
+from orchestration.theory.certificates.region import margin_region
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.certificates.verify_certificate import verified
 from orchestration.theory.stability import delay_bounds
@@ -74,15 +74,15 @@ def test_a_certificate_is_of_its_own_system_and_of_no_other(
     system: System, found: Certified, tmp_path: Path
 ) -> None:  # fmt: skip
     path = found.save(tmp_path / "certificate.json")
-    assert check(path).of == ()
-    own = check(path, system)
+    assert check_certificate(path).of == ()
+    own = check_certificate(path, system)
     assert own.of == (COMMAND,)
     assert own.ranges == {"late": ((0.0, found.certified),)}
     slower = changed(system, {"components.controller.sampling.period": 1.01})
     with pytest.raises(UsageError, match="the events of a period of the system are not those"):
-        check(path, slower)
+        check_certificate(path, slower)
     with pytest.raises(UsageError, match="controller samples: the system's matrix is farther"):
-        check(path, changed(system, {"connections.command.scale": 1.00001}))
+        check_certificate(path, changed(system, {"connections.command.scale": 1.00001}))
 
 
 def test_a_valid_proof_of_altered_matrices_is_refused_against_the_system(
@@ -94,9 +94,9 @@ def test_a_valid_proof_of_altered_matrices_is_refused_against_the_system(
     document["matrices"]["controller samples"] = [*held, [0.99999 * x for x in command]]
     path = tmp_path / "altered.json"
     path.write_text(json.dumps(document), encoding="utf-8")
-    assert check(path).states == 3
+    assert check_certificate(path).states == 3
     with pytest.raises(UsageError, match="farther from the certificate's than the proof covers"):
-        check(path, system)
+        check_certificate(path, system)
 
 
 def test_a_certificate_of_another_quantity_is_refused(system: System, found: Certified, tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_a_certificate_of_another_quantity_is_refused(system: System, found: Cer
     for of in ([SAMPLE], [LOST], [COMMAND, SAMPLE]):
         path.write_text(json.dumps(json.loads(found.certificate) | {"of": of}), encoding="utf-8")
         with pytest.raises(UsageError, match=r"other quantities vary|not those of the certificate"):
-            check(path, system)
+            check_certificate(path, system)
 
 
 @pytest.mark.parametrize("path", [LOST, "connections.measurement.loss"])
@@ -114,7 +114,7 @@ def test_runs_of_losses_are_certified_up_to_the_one_that_breaks(system: System, 
     lost = margin(faster, path)
     assert (lost.certified, lost.breaking) == (1, 2)
     assert [name for name, _ in lost.breaking_sequence] == ["lost", "lost", "arrives"]
-    proof = check(lost.save(tmp_path / "lost.json"), faster)
+    proof = check_certificate(lost.save(tmp_path / "lost.json"), faster)
     assert proof.runs == {"arrives": None, "lost": 1}
 
 
@@ -136,13 +136,13 @@ def test_a_loop_that_is_unstable_by_itself_has_no_margin(system: System) -> None
 def test_two_at_once_leave_less_of_each(system: System, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(regions, "SHARES", (0.2,))
     monkeypatch.setattr(regions, "LONGEST_SEQUENCE", 2)
-    both = region(system, SAMPLE, COMMAND, columns=2)
+    both = margin_region(system, SAMPLE, COMMAND, columns=2)
     (_, alone), (late, beside) = both.certified
     assert late > 0.0
     assert beside < alone
     assert [good for _, good in both.certified] == pytest.approx([0.2 * bad for _, bad in both.breaking], rel=1e-6)
     *proofs, figure = both.save(tmp_path)
-    assert check(proofs[1], system).ranges == {"late": ((0.0, late), (0.0, beside))}
+    assert check_certificate(proofs[1], system).ranges == {"late": ((0.0, late), (0.0, beside))}
     assert figure.stat().st_size > 1000
 
 
@@ -152,7 +152,7 @@ def test_what_it_is_not_for_is_refused(system: System) -> None:
     with pytest.raises(UsageError, match=r"expected connections\.NAME\.delay_jitter"):
         margin(system, "stop_time")
     with pytest.raises(UsageError, match="expected two different"):
-        region(system, COMMAND, COMMAND)
+        margin_region(system, COMMAND, COMMAND)
 
 
 # -- the quadrotor about hover ---------------------------------------------------------------------------------------
