@@ -69,7 +69,7 @@ class SampledRest:
         rungs = max(FEWEST_LIFTED, SAMPLES // samples)
         count = _choose_pulse(excitation, [Rung(samples, self.period)] * (2 * rungs))
         rest.fmu.restore(excitation.rest.saved)
-        fmu = LiftedInstance(rest, samples, self.period)
+        fmu = LiftedInstance(rest, samples)
         lifted = Excitation(lifted_rest(rest, fmu, samples))
         lifted.measure_as(excitation)
         return LiftedTangent(_tangent(lifted, Rung(1, samples * self.period), count, samples), rest, fmu, samples)

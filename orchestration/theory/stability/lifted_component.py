@@ -21,8 +21,8 @@ from orchestration.theory.stability.linearised_component import Tangent
 class LiftedInstance:
     """An instance that takes several samples at a step, each with inputs and outputs of its own."""
 
-    def __init__(self, rest: Rest, samples: int, period: float) -> None:
-        self.fmu, self._period = rest.fmu, period
+    def __init__(self, rest: Rest, samples: int) -> None:
+        self.fmu = rest.fmu
         self._held: Floats = np.tile(rest.held, (samples, 1))
         self._outputs: Floats = np.zeros((samples, len(rest.outputs)))
         self._input, self._output = rest.held.copy(), self._outputs[0].copy()
@@ -53,11 +53,12 @@ class LiftedInstance:
         return transfer
 
     def step(self, t: float, h: float) -> None:
-        """As `Simulator`: the samples in turn."""
+        """As `Simulator`: the samples in turn, each as long as the others."""
+        period = h / len(self._held)
         for k, (held, outputs) in enumerate(zip(self._held, self._outputs)):
             self._input[:] = held
             self._write()
-            self.fmu.step(t + k * self._period, self._period)
+            self.fmu.step(t + k * period, period)
             self._read()
             outputs[:] = self._output
 

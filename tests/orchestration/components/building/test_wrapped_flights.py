@@ -29,7 +29,7 @@ from orchestration.systems.system.model import Criterion
 from orchestration.theory.exact.expect import expected_of
 from orchestration.theory.exact.loops import Loops
 from orchestration.theory.stability.loop_at_rest import AtRest
-from quadcosim import FmuChoice, Scenario, UsageError, bode, changed, load_study, load_system, margin
+from quadcosim import FmuChoice, Scenario, UsageError, bode, changed, linearise, load_study, load_system, margin
 from tests.commands import Main
 from tests.extent import in_test_all, sample
 from tests.orchestration.components.building.test_wrap import PD, PD_C, PD_H
@@ -224,6 +224,8 @@ def test_a_loop_of_code_of_two_rates_has_the_poles_and_margins_of_a_map_made_by_
     assert min(np.abs(np.angle(np.linalg.eigvals(by_hand(turned))) - 0.25 * loop.crossover)) < 1e-6
     late = int(loop.delay_margin / 0.05)
     assert radius(1.0, late) < 1.0 < radius(1.0, late + 1)
+    between = changed(system, {"components.controller.sampling.period": 0.0500000005})  # steps of two lengths
+    assert linearise(between).radius == pytest.approx(radius(1.0), abs=1e-6)
     with pytest.raises(UsageError, match="controller: responds alike only at every 5th sample, as code of several"):
         margin(system, "connections.command.delay_jitter")
     monkeypatch.delattr(AtRest, "tangent")  # refused before any is identified
