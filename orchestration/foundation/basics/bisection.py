@@ -51,9 +51,11 @@ class Range:
         return quantity(value, self.unit, DIGITS)
 
     def values(self) -> list[float]:
-        """The values of the scan, in rising order."""
+        """The values of the scan, in rising order, the last one included."""
         count = math.floor((self.last - self.first) / self.step + 1e-9)
-        steps = (float(f"{self.first + i * self.step:.12g}") for i in range(count + 1))
+        steps = [float(f"{self.first + i * self.step:.12g}") for i in range(count + 1)]
+        if self.last - steps[-1] > self.tolerance:  # the last step is shorter
+            steps.append(self.last)
         values = [*(value for value in self.before if value < self.first), *steps]
         if self.own is None:
             return values

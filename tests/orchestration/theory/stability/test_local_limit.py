@@ -31,7 +31,7 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     assert "this quantity changes nothing" in local_limit.about_rest(lambda value: at(0.4), SPAN).reason
     assert local_limit.about_rest(at, SPAN).reason == "small deviations grow at 50 ms, where the scan begins"
     below = local_limit.about_rest(at, replace(SPAN, last=0.48, own=0.4))
-    assert below.reason == "small deviations decay from 309.985 ms to 450 ms, where the scan ends"
+    assert below.reason == "small deviations decay from 309.985 ms to 480 ms, where the scan ends"
 
 
 @pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, 0.5), (1e9, None)])
