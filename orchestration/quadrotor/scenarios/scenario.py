@@ -195,10 +195,6 @@ class Scenario:
         timing = Timing(period=period, plant_interval=self.timing.plant_interval)
         return dataclasses.replace(self, timing=timing, record=Record(plant=(), controller=()), objectives={})
 
-    def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """Likely mistakes: a nominal model or axes that are not the plant's, a run too short for its timing."""
-        return (*self.mismatches(parameters), *self.timing.warnings(self.stop_time))
-
     def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
         """A nominal model or axes of the controller that are not the plant's."""
         of_axes = axis_mismatch(parameters)

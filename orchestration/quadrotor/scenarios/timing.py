@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, expected_name, shown
+from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.system import distribution
@@ -87,17 +87,6 @@ class Timing:
             require(most < longest, f"{_PLACE}jitter", most, f"less than the period of {longest:g} s")
         if self.clock == "fmu":
             require_own_clock(self, _PLACE)
-
-    def warnings(self, stop_time: float) -> tuple[str, ...]:
-        """Warnings where a run of this length [s] is too short to show this timing."""
-        end = f"the run ends at {shown(stop_time)} s"
-        if self.offset / self.clock_ratio >= stop_time:
-            return (f"timing.offset = {shown(self.offset)}: {end}, so the controller never samples",)
-        if (self.offset + self.period) / self.clock_ratio >= stop_time:
-            return (f"timing.period = {shown(self.period)}: {end}, so the controller samples only once",)
-        if (least := distribution.lowest(self.delay)) >= stop_time:
-            return (f"timing.delay = {shown(least)}: {end}, so no command arrives",)
-        return ()
 
 
 TIMING_KEYS = tuple(f.name for f in fields(Timing))

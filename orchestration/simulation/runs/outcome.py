@@ -105,7 +105,8 @@ def result_of(
             "wall_time": wall_time,
         },
         warnings=(
-            *resolved.request.warnings(resolved.parameters),
+            *resolved.request.mismatches(resolved.parameters),
+            *map(resolved.request.in_own_terms, resolved.system.too_short()),
             *uneven_steps(resolved.system, resolved.models),
             *periods_in_words(resolved.system, resolved.models),
             *idle_partitions(resolved.system, resolved.models),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.components.fmi.read_description import Model, read_model
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, prefixed
+from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import CountProgress, runs_reporter, warn
 from orchestration.simulation.engines.batch.batch import MAX_ROWS
@@ -41,7 +41,7 @@ from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.files import files_of, files_read_by, located
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import parameter_name
-from orchestration.systems.system.request import ControlLoop, Request, errors_in_own_terms
+from orchestration.systems.system.request import Request, errors_in_own_terms
 
 IN_PROCESS = "in_process=True"
 _NOTES = logging.getLogger("quadcosim")
@@ -265,17 +265,16 @@ def _warn_of_mistakes(
     of_time = {
         target: np.broadcast_to(each, runs.shape).reshape(-1)
         for target, each in runs.given.items()
-        if (target.startswith("timing.") or target == "stop_time") and each.dtype.kind in "fiu"
+        if (target.endswith((".period", ".offset", ".delay")) or target == "stop_time") and each.dtype.kind in "fiu"
     }
     settings += [
         np.array([each.argmin(), each.argmax()]) for each in of_time.values()
     ]  # the shortest run has fewest samples
     places = {0, *(int(place) for firsts in settings for place in firsts)}
     for place in sorted(places.union(first_differences(runs.parameters, parameters))):
-        if isinstance(request, ControlLoop) and of_time:
-            with prefixed(f"run {runs.name(place)}: "):
-                request = request.with_values({target: each[place].item() for target, each in of_time.items()})
-        if texts := request.warnings(numeric_parameters(runs.alone(place), models)):
+        system = runs.alone(place)
+        of_model = request.mismatches(numeric_parameters(system, models))
+        if texts := [*of_model, *map(request.in_own_terms, system.too_short())]:
             for text in texts:
                 warn(text)
             return

@@ -4,17 +4,18 @@ It is checked without opening any FMU.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 from typing import Any, ClassVar
 
-from orchestration.foundation.basics.errors import UsageError, listed, prefixed
+from orchestration.foundation.basics.errors import UsageError, listed, prefixed, shown
 from orchestration.foundation.basics.records import record
-from orchestration.foundation.basics.times import is_at_least
+from orchestration.foundation.basics.times import is_at_least, nanoseconds
 from orchestration.systems.expressions.syntax import is_number, parse
 from orchestration.systems.system.component import Component, expect_partitions, has_scheduled_instants
 from orchestration.systems.system.computers import Computer, Network
 from orchestration.systems.system.connection import Connection, Source, component_of
+from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.placement import (
     expect_placement,
@@ -160,9 +161,20 @@ class System:
     def near_continuous(self, period: float) -> None:
         """None: which of its components are the digital ones is not known."""
 
-    def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """A system has no warnings."""
-        return ()
+    def too_short(self) -> Iterator[str]:
+        """A warning for each component and connection for which the run is too short."""
+        end, stop = f"the run ends at {shown(self.stop_time)} s", nanoseconds(self.stop_time)
+        for name, component in self.components.items():
+            sampling, place = component.sampling, f"components.{name}.sampling"
+            if sampling is None or has_scheduled_instants(sampling):
+                continue
+            if sampling.true_offset >= stop:
+                yield f"{place}.offset = {shown(sampling.offset)}: {end}, so {name} never samples"
+            elif sampling.true_offset + sampling.true_period >= stop:
+                yield f"{place}.period = {shown(sampling.period)}: {end}, so {name} samples only once"
+        for x in self.connections:
+            if (least := lowest(x.delay)) >= self.stop_time:
+                yield f"connections.{x.name}.delay = {shown(least)}: {end}, so none of its messages arrives"
 
     def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
         """A system does not know which parameters of its components belong together."""

@@ -51,11 +51,8 @@ class Request(Protocol):
     def near_continuous(self, period: float) -> "Request | None":
         """The same request sampled every `period` [s] without faults or noise; None where that is undefined."""
 
-    def warnings(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """Warnings about likely mistakes, from all numeric parameters in effect, by COMPONENT.NAME."""
-
     def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
-        """Those of them that are about parameters of two components, which many runs may change."""
+        """Warnings about components that do not fit each other, from all numeric parameters, by COMPONENT.NAME."""
 
     def headline(self) -> str:
         """The title of a figure; empty without one."""

@@ -463,9 +463,9 @@ def test_what_is_no_zip_is_no_fmu(main: Main, here: Path, command: str) -> None:
 @pytest.mark.parametrize(
     ("flags", "warning"),
     [
-        (["--period", "5"], "timing.period = 5.0: the run ends at 0.5 s, so the controller samples only once"),
-        (["--offset", "5"], "timing.offset = 5.0: the run ends at 0.5 s, so the controller never samples"),
-        (["--delay", "5"], "timing.delay = 5.0: the run ends at 0.5 s, so no command arrives"),
+        (["--period", "5"], "timing.period = 5.0: the run ends at 0.5 s, so controller samples only once"),
+        (["--offset", "5"], "timing.offset = 5.0: the run ends at 0.5 s, so controller never samples"),
+        (["--delay", "5"], "timing.delay = 5.0: the run ends at 0.5 s, so none of its messages arrives"),
     ],
 )
 def test_a_timing_that_the_run_is_too_short_for_is_warned_of(main: Main, flags: list[str], warning: str) -> None:

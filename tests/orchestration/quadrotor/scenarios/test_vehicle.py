@@ -97,7 +97,7 @@ def test_a_controller_has_the_parameters_of_the_body_of_its_plant(name: str) -> 
         if key in values
     }
     assert len(values_by_target) == 8
-    assert Scenario().warnings(values_by_target) == ()
+    assert Scenario().mismatches(values_by_target) == ()
 
 
 def ideal(vehicle: Vehicle) -> Vehicle:

@@ -11,7 +11,10 @@ from orchestration.simulation.requests.request import load_request
 from orchestration.systems.schedule.instant_arrays import Cursor
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
+from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.file import load_system, schema
+from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")
@@ -215,3 +218,17 @@ def test_every_key_of_the_schema_has_a_description() -> None:
     tables = [schema(), *schema()["$defs"].values()]
     assert len(tables) == 12
     assert all("description" in key for table in tables for key in table["properties"].values())
+
+
+def test_a_run_too_short_for_a_component_or_a_message_is_named() -> None:
+    def law(period: float, offset: float = 0.0) -> Component:
+        return Component(fmu="law.fmu", sampling=Sampling(period=period, offset=offset))
+
+    components = {"late": law(0.1, offset=0.6), "slow": law(0.5), "fast": law(0.1)}
+    sent = [Connection(name=f"m{i}", start=("fast.y",), end=(f"slow.u{i}",), delay=d) for i, d in enumerate((0.7, 0.4))]
+    ends = "the run ends at 0.5 s, so"
+    assert [*System(stop_time=0.5, components=components, connections=tuple(sent)).too_short()] == [
+        f"components.late.sampling.offset = 0.6: {ends} late never samples",
+        f"components.slow.sampling.period = 0.5: {ends} slow samples only once",
+        f"connections.m0.delay = 0.7: {ends} none of its messages arrives",
+    ]
