@@ -264,9 +264,8 @@ def _number(value: float | None) -> str:
 def figures() -> Iterator[tuple[str, Figure]]:
     """All figures of the comparisons, by name."""
     outer = Quantity(name="period", unit="ms", factor=1e3)  # of the outer loops
-    by_size = dict([*_by_size("periods"), *_by_size("fast_inner", RATES)])
     tall = replace(DOCS, width=280.0, height=260.0)
-    yield "comparison_basins", plots.basins(by_size, outer, "survive", "paper's body", tall)
+    yield "comparison_basins", plots.basins(dict(_by_size("periods")), outer, "survive", "paper's body", tall)
     yield (
         "comparison_positions",
         plots.basins(dict(_by_size("positions")), outer, "survive", "initial error of up to 8 m, at rest", WIDE),

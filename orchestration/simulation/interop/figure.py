@@ -57,7 +57,7 @@ def agreement_chart(agreements: Sequence[Agreement], style: Style = SCREEN) -> F
     style.set_title(figure, "open: as the tool comes; filled: with the tool's inputs of the first step in both")
     lines = {line.get_label(): line for line in reversed(panel.get_legend_handles_labels()[0])}
     names = [name for name in (*kinds, AIM) if name in lines]
-    figure.legend([lines[name] for name in names], names, loc="outside right upper")
+    figure.legend([lines[name] for name in names], names, loc="outside lower center", ncols=len(names))
     return figure
 
 

@@ -55,17 +55,18 @@ function tracesOfInset(traces, { span: [first, last] }, number) {
 }
 
 /** The place and the note of an inset in the panel whose upper edge is at `top` of a plot of this height in pixels. */
-function layoutOfInset({ peak, time }, unit, number, top, inner) {
+function layoutOfInset({ peak, time }, unitOfPeak, number, top, inner) {
+  const { unit, each } = unitOfTimes(wholeSpan()[1]);
   const left = gap() > 46 ? 0.42 : 0.58;
   const [low, high] = [top - (0.54 * PANEL) / inner, top - (0.2 * PANEL) / inner];
   const axis = { showgrid: false, zeroline: false, tickfont: { size: 9 }, fixedrange: true, linecolor: paint("edge"), showline: true };
   return {
     axes: {
-      [`xaxis${number}`]: { ...axis, domain: [left, 0.995], anchor: `y${number}`, nticks: 5 },
+      [`xaxis${number}`]: { ...axis, domain: [left, 0.995], anchor: `y${number}`, nticks: 5, each },
       [`yaxis${number}`]: { ...axis, domain: [low, high], anchor: `x${number}`, nticks: 3 },
     },
     note: {
-      text: `clipped: peak ${shown(Number(peak.toPrecision(4)))}${escaped(afterNumber(unit))} at ${shown(Number(time.toPrecision(3)))} s`.replace("-", "−"),
+      text: `clipped: peak ${shown(Number(peak.toPrecision(4)))}${escaped(afterNumber(unitOfPeak))} at ${shown(Number((each * time).toPrecision(3)))} ${unit}`.replace("-", "−"),
       x: 0.995, xref: "paper", xanchor: "right", y: high, yref: "paper", yanchor: "bottom", showarrow: false, font: { size: 10 },
     },
   };

@@ -99,13 +99,14 @@ function ticksOf(axis) {
     const step = Math.max(1, Math.ceil((axis.words.length * (axis.id[0] === "x" ? 60 : 14)) / room));
     return axis.words.map((word, i) => [i, word]).filter((_, i) => i % step === 0);
   }
-  const [low, high] = [Math.min(...axis.ends), Math.max(...axis.ends)];
+  const each = axis.each ?? 1; // ticks are round in the unit that is shown
+  const [low, high] = [each * Math.min(...axis.ends), each * Math.max(...axis.ends)];
   if (axis.isLogarithmic) return ticksOfPowers(low, high, room);
   const most = Math.min(axis.nticks ?? 99, Math.max(2, Math.floor(room / (axis.id[0] === "x" ? 75 : 24))));
   const step = niceStep((5 * (high - low)) / most);
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) found.push(Number((k * step).toPrecision(12)));
-  return found.map((value) => [value, axis.tickformat ? `${Math.round(100 * value)}%` : tickText(value)]);
+  return found.map((value) => [value / each, axis.tickformat ? `${Math.round(100 * value)}%` : tickText(value)]);
 }
 
 function ticksOfPowers(low, high, room) {
@@ -491,7 +492,7 @@ function nearest({ x, y, traces }, [px, py]) {
 
 /** Show what is at the pointer: of signals over time the values of all, else the point that is near. */
 function say(holder, said, at, subplot) {
-  const text = holder.onspan ? saidAt(holder.plot, subplot.x.fromPixel(at[0])) : nearest(subplot, at)?.text;
+  const text = holder.onspan ? saidAt(holder.plot, subplot.x.fromPixel(at[0]), subplot.x) : nearest(subplot, at)?.text;
   said.hidden = !text;
   if (!text) return;
   said.replaceChildren(...linesOf(text).map(({ plain, isBold, isItalic }) => element("div", { textContent: plain, className: isBold ? "strong" : isItalic ? "soft" : "" })));
@@ -500,9 +501,9 @@ function say(holder, said, at, subplot) {
   said.style.top = `${Math.max(0, Math.min(holder.clientHeight - said.offsetHeight, at[1] + 10))}px`;
 }
 
-function saidAt({ traces }, t) {
+function saidAt({ traces }, t, { each, unit }) {
   const lines = traces.filter((trace) => trace.said && trace.x.length).map((trace) => trace.said(placeAt(trace.x, t), t)).filter(Boolean);
-  return lines.length ? [`<b>${Number(t.toPrecision(5))} s</b>`, ...lines].join("<br>") : "";
+  return lines.length ? [`<b>${Number((each * t).toPrecision(5))} ${unit}</b>`, ...lines].join("<br>") : "";
 }
 
 /** Save a plot as a file. */

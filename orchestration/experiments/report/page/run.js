@@ -276,8 +276,9 @@ function setTime(t) {
   player.t = Math.max(signals.time[0], Math.min(endOfRun(), t));
   scene.t = player.t;
   controlsOf.time.value = player.t;
-  controlsOf.time.setAttribute("aria-valuetext", `${player.t.toFixed(2)} s`);
-  controlsOf.clock.textContent = `${player.t.toFixed(2)} s`;
+  const { unit, each } = unitOfTimes(endOfRun());
+  controlsOf.clock.textContent = `${(each * player.t).toFixed(2)} ${unit}`;
+  controlsOf.time.setAttribute("aria-valuetext", controlsOf.clock.textContent);
   if (signals.space) {
     drawScene();
     byId("readout").textContent = readout(signals);

@@ -99,10 +99,11 @@ function traceOf(panel, line, i, k, of, other) {
 function timeLayout(panels, height, signals, peaks) {
   const inner = height - topMargin() - MARGIN.b;
   const isNarrow = gap() > 46;
+  const { unit, each } = unitOfTimes(wholeSpan()[1]);
   const layout = {
     height, margin: { ...MARGIN, t: topMargin() }, annotations: [],
     xaxis: {
-      title: { text: "time [s]" }, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
+      title: { text: `time [${unit}]` }, unit, each, anchor: panels.length > 1 ? `y${panels.length}` : "y", showgrid: true,
       range: [signals.time[0], signals.time[signals.time.length - 1]],
     },
   };

@@ -25,6 +25,13 @@ function withUnit(value, unit) {
   return !unit || shown(value) === "–" ? shown(value) : shown(value) + afterNumber(unit);
 }
 
+/** The unit in which times up to one are shown, and how many of it are a second. */
+function unitOfTimes(longest) {
+  const units = [["s", 1], ["ms", 1e3], ["µs", 1e6], ["ns", 1e9]];
+  const [unit, each] = units.find(([, factor]) => longest * factor >= 1) ?? (longest > 0 ? units.at(-1) : units[0]);
+  return { unit, each };
+}
+
 function titled(name, unit) {
   return unit ? `${name} [${unit}]` : name;
 }

@@ -388,11 +388,17 @@ def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_see
     page.close()
 
 
-def test_where_nothing_moves_there_is_no_button_to_play_it(show: Show, tmp_path: Path) -> None:
-    servo = changed(load_system(EXAMPLES / "double_integrator" / "system.toml"), {"stop_time": 1.0})
+def test_where_nothing_moves_there_is_no_button_to_play_it_and_short_times_are_in_ms(
+    show: Show, tmp_path: Path
+) -> None:
+    servo = changed(load_system(EXAMPLES / "double_integrator" / "system.toml"), {"stop_time": 0.5})
     page = show(report(run(servo), out=tmp_path / "report.html"))
     assert page.get_by_label("Time", exact=True).is_visible()
     assert not page.get_by_role("button", name="Play").is_visible()
+    page.get_by_label("Time", exact=True).press("End")
+    assert page.inner_text("#player output") == "500.00 ms"
+    texts = page.locator("#time-plot text").all_text_contents()
+    assert {"time [ms]", "100", "400"} <= {*texts}
     page.close()
 
 
