@@ -41,6 +41,7 @@ class PlantAtStart:
     """
 
     name: str
+    """Name of the FMU."""
     A: Floats
     """Rates of the states by the states."""
     B: Floats
@@ -52,7 +53,9 @@ class PlantAtStart:
     states: tuple[str, ...]
     """Variables; from sample to sample coordinates without physical meaning."""
     inputs: tuple[str, ...]
+    """Variables that are set."""
     outputs: tuple[str, ...]
+    """Variables that are read."""
     operating_point: dict[str, float]
     """Values about which it is linear, by variable."""
     rates: dict[str, float]
