@@ -128,6 +128,16 @@ def built(making: Making) -> dict[str, Path]:
 
 
 @pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, of this process and of its children."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+@pytest.fixture
 def blank_figures() -> Iterator[None]:
     """Figures are not drawn, for tests of which files there are."""
     with blank_pictures():

@@ -82,32 +82,7 @@ def test_what_is_slowest_decays_alike_however_fast_it_is_sampled(period: float) 
         instances.close()
 
 
-COMPARISON = """
-[base]
-stop_time = 6.0
-[base.plant]
-fmu = "native/QuadrotorPlant"
-max_internal_step = 0.005
-[base.timing]
-plant_interval = 0.005
-[[controllers]]
-name = "unified"
-fmu = "native/UnifiedController"
-[[controllers]]
-name = "LQI"
-fmu = "{folder}/native/LinearFeedback.fmu"
-file = "{folder}/lqi.toml"
-[axis]
-name = "period"
-sets = ["timing.period"]
-values = [0.05]
-[starts]
-count = 12
-position = 4.0
-velocity = 4.0
-angle = 3.1
-rate = 8.0
-"""
+COMPARISON = Path(__file__).with_name("test_linear.toml").read_text(encoding="utf-8")
 
 
 @in_test_all

@@ -3,7 +3,6 @@
 import errno
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import fmpy
@@ -24,16 +23,6 @@ fmu = Fmi2Instance(Path(sys.argv[1]), "plant")
 print("loaded", flush=True)
 time.sleep(6000)
 """
-
-
-@pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files, of this process and of its children."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    monkeypatch.setenv("TMPDIR", str(folder))
-    return folder
 
 
 def start(fmu: Path) -> subprocess.Popen[str]:

@@ -28,28 +28,7 @@ def test_nothing_is_wrong_with_those_of_this_project(model: str) -> None:
     assert validate(fmus.locate(f"native/fmi3/{model}")) == []
 
 
-SMALL = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiationToken="small">
-  <CoSimulation modelIdentifier="Small" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true"
-    canSerializeFMUState="true"/>
-  <TypeDefinitions><EnumerationType name="Mode"><Item name="up" value="1"/><Item name="down" value="2"/>
-  </EnumerationType></TypeDefinitions>
-  <DefaultExperiment stopTime="1" stepSize="0.01"/>
-  <ModelVariables>
-    <Float64 name="time" valueReference="10" causality="independent"/>
-    <Float64 name="u" valueReference="0" causality="input" start="0 0"><Dimension start="2"/></Float64>
-    <Float64 name="y" valueReference="1" causality="output"><Dimension start="2"/></Float64>
-    <Float32 name="gain" valueReference="2" causality="parameter" variability="tunable" start="1"/>
-    <Boolean name="on" valueReference="3" causality="input" start="true"/>
-    <Boolean name="high" valueReference="4" causality="output"/>
-    <UInt8 name="count" valueReference="5" causality="output"/>
-    <Enumeration name="mode" valueReference="6" causality="parameter" declaredType="Mode" start="1"/>
-  </ModelVariables>
-  <ModelStructure>
-    <Output valueReference="1"/><Output valueReference="4"/><Output valueReference="5"/>
-    <InitialUnknown valueReference="1" dependencies=""/><InitialUnknown valueReference="4" dependencies=""/>
-    <InitialUnknown valueReference="5" dependencies=""/>
-  </ModelStructure>
-</fmiModelDescription>"""
+SMALL = Path(__file__).with_name("test_validation_fmi3.xml").read_text(encoding="utf-8")
 
 
 def foreign(folder: Path, *habits: str, old: str = "", new: str = "") -> Path:

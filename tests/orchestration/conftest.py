@@ -1,9 +1,11 @@
-"""What the tests of `quadcosim ssp` and `quadcosim interop` share."""
+"""What tests of several districts share."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from orchestration.components.fmi.reuse import Instances
 from quadcosim import Scenario
 from tests.fmus.source_tree import build, copy_sources, replace
 
@@ -33,3 +35,11 @@ def odd_plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
     heavier = f"{body}.with_mass(self.mass + 0.1 * self.cargo * self.loaded)"
     replace(sources / "plant_fmu" / "slave.py", body, heavier)
     return build(sources, folder, "QuadrotorPlant")
+
+
+@pytest.fixture(scope="module")
+def instances() -> Iterator[Instances]:
+    """Instances that the loops of a module's tests use again."""
+    found = Instances()
+    yield found
+    found.close()

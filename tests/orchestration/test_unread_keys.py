@@ -12,21 +12,7 @@ from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.simulation.requests.request import load_request
 from quadcosim import UsageError
 
-SCENARIO = """
-stop_time = 1.0
-[controller]
-gain.eta = 15.0
-[timing]
-period = 0.01
-[reference]
-name = "circle"
-radius = 1.0
-[disturbance]
-name = "dryden"
-wind_speed = 8.0
-[record]
-plant = ["tilt"]
-"""
+SCENARIO = (Path(__file__).with_name("unread_keys") / "scenario.toml").read_text(encoding="utf-8")
 SYSTEM = """
 stop_time = 1.0
 [components.plant]
@@ -52,51 +38,12 @@ name = "timing.delay"
 start = 0.0
 stop = 0.01
 """
-COMPARISON = """
-[base]
-stop_time = 1.0
-[starts]
-count = 2
-[axis]
-name = "timing.period"
-values = [0.01, 0.02]
-[front]
-error = "position_rmse"
-[[vehicles]]
-name = "heavy"
-plant = { mass = 2.0 }
-[[controllers]]
-name = "unified"
-file = "gains.toml"
-[[conditions]]
-name = "nominal"
-sets = { "timing.delay" = 0.001 }
-"""
+COMPARISON = (Path(__file__).with_name("unread_keys") / "comparison.toml").read_text(encoding="utf-8")
 GAINS = """
 [controller]
 "gain.eta" = 14.0
 """
-TUNING = """
-[base]
-stop_time = 1.0
-[cost]
-of = "position_rmse"
-bad = 10.0
-[search]
-periods = [0.01]
-evaluations = 4
-seeds = [0]
-[starts]
-judged = 4
-[[parameters]]
-name = "controller.gain.eta"
-start = 1.0
-stop = 20.0
-[[parameters]]
-name = "controller.gain.theta"
-start = 1.0
-stop = 20.0
-"""
+TUNING = (Path(__file__).with_name("unread_keys") / "tuning.toml").read_text(encoding="utf-8")
 FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scenario": (SCENARIO, load_request),
     "system": (SYSTEM, load_request),

@@ -19,29 +19,7 @@ from quadcosim import schedule
 from tests.commands import Main
 from tests.places import EXAMPLES
 
-SYSTEM = """
-[computers.cpu]
-switch = 0.0001
-
-[computers.cpu.tasks.control]
-period = 0.004
-execution = 0.001
-
-[computers.cpu.tasks.telemetry]
-period = 0.013
-execution = 0.011
-priority = 2
-
-[networks.bus]
-kind = "can"
-bit_rate = 500e3
-error = 0.2
-
-[networks.bus.messages.status]
-period = 0.005
-bytes = 8
-identifier = 1
-"""
+SYSTEM = Path(__file__).with_name("test_schedule.toml").read_text(encoding="utf-8")
 
 
 def run_of(system: System, window: Window | None = None) -> DrawnRun:

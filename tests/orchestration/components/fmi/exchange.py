@@ -14,90 +14,13 @@ _SOURCE = Path(__file__).with_name("exchange.c")
 _STATES = {"integrator": 2, "ball": 2, "oscillator": 2, "restless": 2}
 _CROSSINGS = {"ball": 1, "restless": 1}
 
-_FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{guid}">
-  {interfaces}
-  <ModelVariables>
-    <Float64 name="time" valueReference="0" causality="independent"/>
-    <Float64 name="x1" valueReference="1" causality="output"/>
-    <Float64 name="x2" valueReference="2" causality="output"/>
-    <Float64 name="dx1" valueReference="3" derivative="1"/>
-    <Float64 name="dx2" valueReference="4" derivative="2"/>
-    <Float64 name="u" valueReference="5" causality="input" start="0"/>
-    <Float64 name="w" valueReference="6" causality="input" start="0"/>
-    <Float64 name="p" valueReference="7" causality="parameter" variability="tunable" start="{p}"/>
-    <Float64 name="q" valueReference="8" causality="parameter" variability="tunable" start="0"/>
-    <Float64 name="start" valueReference="10" causality="parameter" variability="fixed" start="{start}"/>
-    <Float64 name="y" valueReference="9" causality="output"/>
-    <Int32 name="count" valueReference="20" causality="output"/>
-    <Int32 name="updates" valueReference="21" causality="output"/>
-  </ModelVariables>
-  <ModelStructure>
-    <Output valueReference="1"/><Output valueReference="2"/><Output valueReference="9"/>{states}
-    <InitialUnknown valueReference="1" dependencies=""/>
-    <InitialUnknown valueReference="9" dependencies="{feeds}"/>
-  </ModelStructure>
-</fmiModelDescription>"""
+_FMI3 = Path(__file__).with_name("exchange3.xml").read_text(encoding="utf-8")
 
-_CLOCKED = """<fmiModelDescription fmiVersion="3.0" modelName="Law" instantiationToken="law">
-  <CoSimulation modelIdentifier="law" canGetAndSetFMUState="true" canSerializeFMUState="true" hasEventMode="true"
-    canHandleVariableCommunicationStepSize="true"/>
-  <ModelVariables>
-    <Float64 name="u" valueReference="5" causality="input" variability="discrete" clocks="30" start="0"/>
-    <Float64 name="w" valueReference="6" causality="input" variability="discrete" clocks="30" start="0"/>
-    <Float64 name="p" valueReference="7" causality="parameter" variability="fixed" start="-1"/>
-    <Float64 name="q" valueReference="8" causality="parameter" variability="fixed" start="-1"/>
-    <Float64 name="y" valueReference="9" causality="output" variability="discrete" clocks="30" start="0"/>
-    <Float64 name="period" valueReference="11" causality="output"/>
-    <Int32 name="misused" valueReference="22" causality="output"/>
-    <Int32 name="ticks" valueReference="23" causality="output"/>
-    <Int32 name="slow_ticks" valueReference="24" causality="output"/>
-    {clocks}
-  </ModelVariables>
-  <ModelStructure><Output valueReference="9"/></ModelStructure>
-</fmiModelDescription>"""
-_CLOCKS = """<fmiModelDescription fmiVersion="3.0" modelName="Clocks" instantiationToken="clocks">
-  <ScheduledExecution modelIdentifier="clocks" canGetAndSetFMUState="true" canSerializeFMUState="true"/>
-  <ModelVariables>
-    <Float64 name="u" valueReference="5" causality="input" variability="discrete" clocks="30 31" start="0"/>
-    <Float64 name="y" valueReference="9" causality="output" variability="discrete" clocks="30 31 32" start="0"/>
-    <Float64 name="w" valueReference="6" causality="input" variability="discrete" clocks="30" start="0"/>
-    <Float64 name="p" valueReference="7" causality="parameter" variability="fixed" start="1"/>
-    <Int32 name="jobs1" valueReference="40" causality="output" clocks="30"/>
-    <Int32 name="jobs2" valueReference="41" causality="output" clocks="31"/>
-    <Int32 name="jobs3" valueReference="42" causality="output" clocks="32"/>
-    <Int32 name="total" valueReference="43" causality="output" clocks="30 31 32"/>
-    {clocks}
-  </ModelVariables>
-  <ModelStructure><Output valueReference="9"/></ModelStructure>
-</fmiModelDescription>"""
+_CLOCKED = Path(__file__).with_name("clocked.xml").read_text(encoding="utf-8")
+_CLOCKS = Path(__file__).with_name("clocks.xml").read_text(encoding="utf-8")
 _FAST = '<Clock name="{name}" valueReference="{reference}" causality="input" intervalVariability="{kind}" {interval}/>'
 
-_FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{guid}" numberOfEventIndicators="{crossings}">
-  {interfaces}
-  <ModelVariables>
-    <ScalarVariable name="x1" valueReference="1" causality="output"><Real/></ScalarVariable>
-    <ScalarVariable name="x2" valueReference="2" causality="output"><Real/></ScalarVariable>
-    <ScalarVariable name="dx1" valueReference="3"><Real derivative="1"/></ScalarVariable>
-    <ScalarVariable name="dx2" valueReference="4"><Real derivative="2"/></ScalarVariable>
-    <ScalarVariable name="u" valueReference="5" causality="input"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="w" valueReference="6" causality="input"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="p" valueReference="7" causality="parameter" variability="tunable"><Real start="{p}"/>
-    </ScalarVariable>
-    <ScalarVariable name="q" valueReference="8" causality="parameter" variability="tunable"><Real start="0"/>
-    </ScalarVariable>
-    <ScalarVariable name="y" valueReference="9" causality="output"><Real/></ScalarVariable>
-    <ScalarVariable name="start" valueReference="10" causality="parameter" variability="fixed"><Real start="{start}"/>
-    </ScalarVariable>
-    <ScalarVariable name="count" valueReference="20" causality="output" variability="discrete"><Integer/>
-    </ScalarVariable>
-    <ScalarVariable name="updates" valueReference="21" causality="output" variability="discrete"><Integer/>
-    </ScalarVariable>
-  </ModelVariables>
-  <ModelStructure>
-    <Outputs><Unknown index="1"/><Unknown index="2"/><Unknown index="9"/></Outputs>{states}
-    <InitialUnknowns><Unknown index="1" dependencies=""/><Unknown index="9" dependencies="{feeds}"/></InitialUnknowns>
-  </ModelStructure>
-</fmiModelDescription>"""
+_FMI2 = Path(__file__).with_name("exchange2.xml").read_text(encoding="utf-8")
 
 
 def exchange(folder: Path, kind: str, *, fmi: int = 3, event_mode: bool = False, slopes: bool = False) -> Path:

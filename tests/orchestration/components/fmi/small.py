@@ -21,49 +21,9 @@ needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 _SOURCE = Path(__file__).with_name("small.c")
 _KEPT = b"0123456789abcdef" * 2
 
-_FMI2 = """<fmiModelDescription fmiVersion="2.0" modelName="Small" guid="small">
-  <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
-  <TypeDefinitions><SimpleType name="Mode"><Enumeration>{items}</Enumeration></SimpleType></TypeDefinitions>
-  <ModelVariables>
-    <ScalarVariable name="u" valueReference="0" causality="input"><Real start="0"/></ScalarVariable>
-    <ScalarVariable name="y" valueReference="1" causality="output"><Real/></ScalarVariable>
-    <ScalarVariable name="gain" valueReference="2" causality="parameter" variability="tunable"><Real start="1"/>
-    </ScalarVariable>
-    <ScalarVariable name="on" valueReference="3" causality="input" variability="discrete"><Boolean start="true"/>
-    </ScalarVariable>
-    <ScalarVariable name="high" valueReference="4" causality="output" variability="discrete"><Boolean/></ScalarVariable>
-    <ScalarVariable name="count" valueReference="5" causality="output" variability="discrete"><Integer/>
-    </ScalarVariable>
-    <ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
-      <Enumeration declaredType="Mode" start="1"/></ScalarVariable>
-    <ScalarVariable name="label" valueReference="7" causality="parameter" variability="fixed"><String start=""/>
-    </ScalarVariable>
-  </ModelVariables>
-  <ModelStructure>
-    <Outputs><Unknown index="2"/><Unknown index="5"/><Unknown index="6"/></Outputs>
-    <InitialUnknowns><Unknown index="2" dependencies=""/></InitialUnknowns>
-  </ModelStructure>
-</fmiModelDescription>"""
+_FMI2 = Path(__file__).with_name("small2.xml").read_text(encoding="utf-8")
 
-_FMI3 = """<fmiModelDescription fmiVersion="3.0" modelName="Small" instantiationToken="small">
-  <CoSimulation modelIdentifier="Small" {attributes}/>{experiment}
-  <TypeDefinitions><EnumerationType name="Mode">{items}</EnumerationType></TypeDefinitions>
-  <ModelVariables>
-    <Float64 name="u" valueReference="0" causality="input" start="0 0"><Dimension start="2"/></Float64>
-    <Float64 name="y" valueReference="1" causality="output"><Dimension start="2"/></Float64>
-    <Float32 name="gain" valueReference="2" causality="parameter" variability="tunable" start="1"/>
-    <Boolean name="on" valueReference="3" causality="input" start="true"/>
-    <Boolean name="high" valueReference="4" causality="output"/>
-    <UInt8 name="count" valueReference="5" causality="output"/>
-    <Enumeration name="mode" valueReference="6" causality="parameter" variability="fixed" declaredType="Mode"
-      start="1"/>
-    {more}
-  </ModelVariables>
-  <ModelStructure>
-    <Output valueReference="1"/><Output valueReference="4"/><Output valueReference="5"/>
-    <InitialUnknown valueReference="1" dependencies=""/>
-  </ModelStructure>
-</fmiModelDescription>"""
+_FMI3 = Path(__file__).with_name("small3.xml").read_text(encoding="utf-8")
 
 _MODE = """<ScalarVariable name="mode" valueReference="6" causality="parameter" variability="fixed">
       <Enumeration declaredType="Mode" start="1"/></ScalarVariable>"""

@@ -37,29 +37,7 @@ _DESCRIPTION = f"""<fmiModelDescription fmiVersion="1.0" modelName="Old" modelId
   </ModelVariables>
   {_ALONE}
 </fmiModelDescription>"""
-_SYSTEM = """stop_time = 1.0
-
-[components.plant]
-fmu = "old.fmu"
-step = 0.125
-parameters = { y = 1.0, gain = 2.0 }
-record = ["y", "high", "span"]
-
-[components.law]
-fmu = "small.fmu"
-parameters = { gain = -1.0 }
-sampling = { period = 0.25 }
-
-[[connections]]
-name = "measured"
-from = ["plant.y"]
-to = ["law.u"]
-
-[[connections]]
-name = "command"
-from = ["law.y"]
-to = ["plant.u"]
-"""
+_SYSTEM = Path(__file__).with_name("test_fmi1.toml").read_text(encoding="utf-8")
 _RUN = ("run", "system.toml", "--in-process")
 
 

@@ -200,28 +200,7 @@ plant = {{ fmu = "native/QuadrotorPlant" }}
 reference = {{ name = "circle" }}
 """
 
-TUNED = """
-[cost]
-of = "position_rmse"
-bad = 10.0
-[starts]
-count = 1
-judged = 1
-[search]
-periods = [0.02]
-evaluations = 1
-seeds = [1]
-[[parameters]]
-name = "k_p"
-sets = ["controller.k_p"]
-start = 2.0
-stop = 5.0
-[[parameters]]
-name = "k_d"
-sets = ["controller.k_d"]
-start = 2.0
-stop = 5.0
-"""
+TUNED = Path(__file__).with_name("tuned.toml").read_text(encoding="utf-8")
 
 
 def test_studies_and_tunings_take_it_with_vehicle_and_reference(

@@ -20,34 +20,7 @@ from quadcosim import FmuChoice, Scenario, UsageError
 from tests.commands import Main
 from tests.pictures import blank_pictures
 
-FILE = """
-name = "small"
-[base]
-stop_time = 3.0
-[base.plant]
-fmu = "QuadrotorPlant"
-max_internal_step = 0.005
-[base.timing]
-plant_interval = 0.005
-[[controllers]]
-name = "coupled"
-[[controllers]]
-name = "uncoupled"
-parameters = { coupling = 0.0 }
-[[conditions]]
-name = "nominal"
-[[conditions]]
-name = "noise"
-sets = { timing.noise.velocity = 0.01, timing.jitter = 0.002 }
-[axis]
-name = "period"
-sets = ["timing.period"]
-values = [0.02, 0.1]
-[starts]
-count = 6
-position = 1.0
-velocity = 0.5
-"""
+FILE = Path(__file__).with_name("test_compare.toml").read_text(encoding="utf-8")
 CELLS = 8
 
 

@@ -14,41 +14,7 @@ from orchestration.systems.system.paths import value_at
 from quadcosim import UsageError
 from tests.places import ROOT
 
-FILE = """
-[base]
-stop_time = 2.0
-seed = 40
-[base.timing]
-plant_interval = 0.005
-[[controllers]]
-name = "plain"
-[[controllers]]
-name = "tuned"
-fmu = "native/UnifiedController"
-file = "gains_{vehicle}_{milli}ms.toml"
-parameters = { coupling = 0.0 }
-[[vehicles]]
-name = "light"
-vehicle = "light.toml"
-[[vehicles]]
-name = "heavy"
-plant = { mass = 2.0, wind.frequency = 0.2 }
-controller.mass = 2.0
-[[conditions]]
-name = "nominal"
-[[conditions]]
-name = "mismatch"
-multiplies = { "plant.mass" = 1.5 }
-sets = { timing.loss = 0.1, timing.noise.position = 0.01 }
-[axis]
-name = "period"
-sets = ["timing.period"]
-values = [0.01, 0.02, 0.04]
-[starts]
-count = 5
-seed = 3
-position = 1.0
-"""
+FILE = Path(__file__).with_name("test_design.toml").read_text(encoding="utf-8")
 CELLS = 2 * 2 * 2 * 3
 MASS, NOMINAL = "components.plant.parameters.mass", "components.controller.parameters.mass"
 COUPLING = "components.controller.parameters.coupling"

@@ -3,10 +3,8 @@
 import gzip
 import importlib.util
 import json
-import os
 import random
 import re
-import shutil
 import sys
 from types import SimpleNamespace
 
@@ -24,7 +22,6 @@ from tests.patience import PATIENCE
 ZIG = pytest.mark.skipif(
     importlib.util.find_spec("ziglang") is None, reason="no compiler for WebAssembly: pip install 'quadcosim[live]'"
 )
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 COLUMNS = ("plant.position.x", "plant.quaternion.w", "plant.thrust")
 KNOWN = (  # period, delay, κ; outcome, time of divergence, ultimate bound, as `fly` has them
     ({"timing.period": 0.07}, "settled", None, 0.0012746940253144442),
@@ -91,20 +88,6 @@ def test_its_modules_have_the_rows_of_fly_to_the_bit(paper, part):
         found += [each[0] for each in page.fly([{**each, "stop_time": 1.5} for each in set_], COLUMNS)]
     assert page.lanes == (1 if part == "single" else 2)
     assert found == hashes_of(flights, COLUMNS)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    path = next((found for name in BROWSERS if (found := shutil.which(name)) is not None), None)
-    if path is None:
-        pytest.skip(f"none of {', '.join(BROWSERS)} is on this machine")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as started:
-        place = {**os.environ, "TMPDIR": "/tmp"}  # its sockets are in it, whose paths must be short
-        opened = started.chromium.launch(executable_path=path, args=["--no-sandbox"], env=place)
-        yield opened
-        opened.close()
 
 
 def wait(page, condition):

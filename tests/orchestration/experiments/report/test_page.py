@@ -2,8 +2,6 @@
 
 import dataclasses
 import io
-import os
-import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -32,22 +30,7 @@ from tests.orchestration.experiments.studies.common import axis, sweep
 from tests.patience import PATIENCE
 from tests.places import EXAMPLES
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 Show = Callable[[Path], Any]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    path = next((found for name in BROWSERS if (found := shutil.which(name)) is not None), None)
-    if path is None:
-        pytest.skip(f"none of {', '.join(BROWSERS)} is on this machine")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as started:
-        place = {**os.environ, "TMPDIR": "/tmp"}  # its sockets are in it, whose paths must be short
-        opened = started.chromium.launch(executable_path=path, args=["--no-sandbox"], env=place)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")

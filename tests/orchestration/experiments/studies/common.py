@@ -34,26 +34,7 @@ from tests.patience import PATIENCE
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 
 # Everything random is on: a run that took another seed or an order of its own would show in its bits.
-NOISY = """
-[base]
-stop_time = 0.2
-[base.timing]
-jitter = 0.002
-delay_jitter = 0.003
-measurement_loss = 0.1
-command_loss = 0.1
-noise.position = 0.001
-[[axes]]
-name = "period"
-sets = ["timing.period"]
-values = [0.004, 0.006, 0.01, 0.02]
-[[axes]]
-name = "delay"
-sets = ["timing.delay"]
-values = [0.0, 0.003, 0.012, 0.02]
-[design]
-vary_seed = true
-"""
+NOISY = Path(__file__).with_name("noisy.toml").read_text(encoding="utf-8")
 RUNS = 16
 OBJECTIVES = tuple(quadrotor().objectives)
 METRICS = metrics_with(OBJECTIVES)

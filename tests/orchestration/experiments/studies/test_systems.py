@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +45,6 @@ def system() -> System:
         criterion=Criterion(good="late < 0.9", diverged="abs(plant.x) > 1e3"),
         operating_point=AT_REST,
     )
-
-
-@pytest.fixture(scope="module")
-def instances() -> Iterator[Instances]:
-    made = Instances()
-    yield made
-    made.close()
 
 
 def axis(path: str, *values: Any) -> Axis:

@@ -4,6 +4,7 @@ import re
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -18,38 +19,7 @@ from orchestration.simulation.engines.batch import shape
 from orchestration.systems.system.paths import value_at
 from tests.orchestration.components.fmi.small import needs_compiler
 
-FILE = """
-[base]
-stop_time = 5.0
-[base.controller]
-fmu = "native/UnifiedController"
-[base.plant]
-fmu = "native/QuadrotorPlant"
-[base.timing]
-plant_interval = 0.005
-[cost]
-of = "position_rmse + 0.01 * total_variation.torque / stop_time"
-bad = 10.0
-[starts]
-count = 3
-judged = 4
-position = 1.0
-[search]
-periods = [0.01, 0.02]
-evaluations = 100
-seeds = [1, 2]
-[[parameters]]
-name = "attitude"
-sets = ["controller.gain.attitude", "controller.gain.theta"]
-start = 1.0
-stop = 100.0
-scale = "logarithmic"
-[[parameters]]
-name = "surface"
-sets = ["controller.gain.surface"]
-start = 0.5
-stop = 20.0
-"""
+FILE = Path(__file__).with_name("test_tuning.toml").read_text(encoding="utf-8")
 GAINS = "components.controller.parameters.gain"
 
 

@@ -56,11 +56,6 @@ EXAMPLES = sorted(ROOT.glob("examples/*/system.toml"))
 
 
 @pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return moving(tmp_path_factory.mktemp("moving"))
-
-
-@pytest.fixture(scope="module")
 def fixed_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same, but that it takes steps of one length only."""
     return moving(tmp_path_factory.mktemp("fixed"), fixed_step=True)
@@ -83,13 +78,6 @@ class Kept:
     def close(self) -> None:
         for instance in self._instances.values():
             instance.close()
-
-
-@pytest.fixture(scope="module")
-def kept() -> Iterator[Kept]:
-    instances = Kept()
-    yield instances
-    instances.close()
 
 
 def ran(system: System, engine: Any, **keys: Any) -> Result:

@@ -1,7 +1,6 @@
 """Systems on computers and networks have the same bits with all engines, in windows, and beyond a pause."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,18 +40,6 @@ from tests.orchestration.simulation.engines.test_compiled import (
 )
 
 pytestmark = needs_compiler
-
-
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return moving(tmp_path_factory.mktemp("moving"))
-
-
-@pytest.fixture(scope="module")
-def kept() -> Iterator[Kept]:
-    instances = Kept()
-    yield instances
-    instances.close()
 
 
 @given(systems_on_computers(), st.sampled_from((1, 7, 2**13)))

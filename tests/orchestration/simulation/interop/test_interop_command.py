@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,15 +37,6 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def interop(main: Main, flight: Path) -> Main:
     """The command for its first steps."""
     return functools.partial(main, "interop", flight, *SHORT)
-
-
-@pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """A pool of worker processes leaves nothing behind, whatever ends its sweep."""
 
-import tempfile
 import threading
 from contextlib import ExitStack
 from pathlib import Path
@@ -22,16 +21,6 @@ from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.experiments.studies.common import sweep
 
 GAIN = "components.it.parameters.gain"
-
-
-@pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files, of this process and of its children."""
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    monkeypatch.setenv("TMPDIR", str(folder))
-    return folder
 
 
 def inputs(**contents: bytes) -> Inputs:

@@ -13,39 +13,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from tests.orchestration.systems.system.described import described
 
-TANK = """\
-stop_time = 1.0
-
-[components.tank]
-fmu = "Tank.fmu"
-step = 0.01
-parameters = { area = 2.0, rough = true }
-
-[components.controller]
-fmu = "Controller.fmu"
-sampling = { period = 0.1 }
-record = ["valve"]
-
-[[connections]]
-name = "level"
-from = ["tank.level"]
-to = ["controller.level"]
-
-[[connections]]
-name = "valve"
-from = ["controller.valve"]
-to = ["tank.valve"]
-
-[sources.rain]
-to = ["tank.inflow"]
-constant = 1.0
-
-[objectives]
-peak = "max(tank.level)"
-
-[criterion]
-diverged = "controller.valve and tank.level > 5"
-"""
+TANK = Path(__file__).with_name("test_check.toml").read_text(encoding="utf-8")
 
 
 def checked(folder: Path, text: str) -> dict[str, tuple[str, ...]]:

@@ -12,68 +12,9 @@ from orchestration.systems.system.file import load_system
 from tests.commands import Main
 from tests.pictures import expect_picture
 
-SYSTEM = """
-stop_time = 5.0
-[components.motor]
-fmu = "motor.fmu"
-step = 0.001
-[components.filter]
-fmu = "filter.fmu"
-sampling = { period = 0.002, jitter = 0.0005 }
-[components.controller]
-fmu = "controller.fmu"
-parameters = { gain = 2.0 }
-sampling = { period = 0.01, offset = 0.001, clock_ratio = 1.001 }
-[[connections]]
-from = ["motor.angle"]
-to = ["filter.u"]
-quantisation = 0.001
-[[connections]]
-name = "bus"
-from = ["filter.y.a", "filter.y.b"]
-to = ["controller.y.a", "controller.y.b"]
-delay = 0.003
-delay_jitter = 0.001
-loss = 0.1
-burst_length = 3
-[[connections]]
-from = ["controller.u"]
-to = ["motor.voltage"]
-hold = "first"
-noise = 0.01
-order = "jacobi"
-[sources.load]
-to = ["motor.load"]
-noise = 0.1
-period = 0.01
-[objectives]
-peak = "max(motor.angle)"
-[criterion]
-good = "peak < 1"
-"""
+SYSTEM = Path(__file__).with_name("test_show.toml").read_text(encoding="utf-8")
 
-TEXT = """\
-3 components, 3 connections, 5 s
-
-components
-  motor       motor.fmu       continuous, step 1 ms
-  filter      filter.fmu      every 2 ms, jitter 500 µs uniform
-  controller  controller.fmu  every 10 ms, from 1 ms, clock 1.001 times true time  gain = 2.0
-
-connections
-  0    motor -> filter       quantisation 0.001                                               angle -> u
-  bus  filter -> controller  delay 3 ms, delay jitter 1 ms uniform, loss 10 % in bursts of 3  y.{a,b}
-  2    controller -> motor   hold first, noise 0.01, jacobi                                   u -> voltage
-
-sources
-  load  white noise of intensity 0.1, held 10 ms  motor.load
-
-objectives
-  peak  max(motor.angle)
-
-criterion
-  good  peak < 1
-"""
+TEXT = Path(__file__).with_name("test_show.txt").read_text(encoding="utf-8")
 
 
 @pytest.fixture

@@ -19,52 +19,7 @@ from orchestration.systems.system.paths import changed, value_at
 
 SHIPPED = Path(translation.__file__).with_name("system.toml")
 
-TANK = """\
-stop_time = 60.0
-seed = 3
-order = "jacobi"
-
-[components.tank]
-fmu = "Tank.fmu"
-step = 0.01
-parameters = { area = 2.0, "pipe.length" = 3.0 }
-align = "next"
-tolerance = 1e-6
-
-[components.controller]
-fmu = "Controller.fmu"
-sampling = { period = 0.1, jitter = 0.02, jitter_distribution = "normal" }
-record = ["mode"]
-
-[[connections]]
-from = ["tank.level"]
-to = ["controller.level"]
-noise = 0.001
-
-[[connections]]
-name = "valve"
-from = ["controller.valve"]
-to = ["tank.valve"]
-order = "gauss-seidel"
-delay = 0.25
-loss = 0.1
-burst_length = 2.0
-hold = "first"
-scale = 2.0
-
-[sources.rain]
-to = ["tank.inflow"]
-noise = 0.1
-period = 0.5
-
-[objectives]
-peak = "max(tank.level)"
-late = "settling_time(tank.level - 1, 0.1)"
-
-[criterion]
-good = "peak < 2.5"
-diverged = "abs(tank.level) > 100"
-"""
+TANK = Path(__file__).with_name("test_system_file.toml").read_text(encoding="utf-8")
 
 
 def loaded(folder: Path, text: str):

@@ -14,31 +14,7 @@ from orchestration.systems.system.file import load_system
 from tests.commands import Main
 from tests.orchestration.systems.system.described import described
 
-SYSTEM = """
-stop_time = 1.0
-[components.car]
-fmu = "Car.fmu"
-step = 0.1
-[components.driver]
-fmu = "Driver.fmu"
-sampling = { period = 0.1 }
-[[connections]]
-from = ["car.place"]
-to = ["driver.seen"]
-[sources.hill]
-to = ["car.slope"]
-constant = 1.0
-[objectives]
-far = "max(car.place)"
-absement = "integral(car.place)"
-late = "settling_time(car.place - driver.goal, 0.1)"
-climbed = "max(hill.slope)"
-told = "last(car.place) - far"
-gear = "max(car.gear * car.place)"
-[criterion]
-good = "far > 1 and told < far"
-diverged = "abs(car.place) > 10 * driver.goal"
-"""
+SYSTEM = Path(__file__).with_name("test_units.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -39,13 +38,6 @@ MEASUREMENT = Varying(kind=DELAY, name="measurement", path="connections.measurem
 SAMPLE = Varying(kind=JITTER, name="controller", path="components.controller.sampling.jitter")
 LOST = Varying(kind=LOSS, name="command", path="connections.command.loss")
 LOST_MEASUREMENT = Varying(kind=LOSS, name="measurement", path="connections.measurement.loss")
-
-
-@pytest.fixture(scope="module")
-def instances() -> Iterator[Instances]:
-    found = Instances()
-    yield found
-    found.close()
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +34,6 @@ from tests.orchestration.experiments.studies.common import one_line
 from tests.orchestration.experiments.studies.test_systems import DELAY, PERIOD, theory
 
 FMU = "components.{}.fmu"
-
-
-@pytest.fixture(scope="module")
-def instances() -> Iterator[Instances]:
-    found = Instances()
-    yield found
-    found.close()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ their linear maps are products of matrices here.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -233,13 +232,6 @@ def step_map(A: Floats, B: Floats) -> tuple[Floats, Floats]:
     M[:n, :n], M[:n, n:] = A * STEP, B * STEP
     found = np.eye(n + 1) + M + M @ M / 2.0 + M @ M @ M / 6.0 + M @ M @ M @ M / 24.0
     return found[:n, :n], found[:n, n:]
-
-
-@pytest.fixture(scope="module")
-def instances() -> Iterator[Instances]:
-    found = Instances()
-    yield found
-    found.close()
 
 
 @needs_compiler
