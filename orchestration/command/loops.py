@@ -46,7 +46,7 @@ def bode(
                 or "infinite",
                 "infinite" if phase is None else f"{phase:.4g}°",
                 "not known" if loop.delay_reason else "infinite" if delay is None else quantity(delay, "s"),
-                "-" if crossover is None else f"{crossover:.4g} rad/s",
+                "-" if crossover is None else f"{crossover:.4g} rad/s ({crossover / math.tau:.4g} Hz)",
                 f"{loop.sensitivity_peak:.4g}",
             )
         )
@@ -112,14 +112,21 @@ def locus(
     found = locus_of(request_from(scenario, flags, timing), of, first=first, last=last, count=count)
     if out is not None:
         _draw(found.plot(), out)
-    rows = [("crossing", "value", "pole", "frequency")]
+    rows = [("crossing", "value", "pole")]
     for one in found.crossings:
         pole = f"{one.z.real:.4f}" + (f" ± {one.z.imag:.4f}j" if one.z.imag else "")
         way = "leaves" if one.leaves else "returns"
-        rows.append((way, quantity(one.value, found.unit, 6), pole, f"{one.frequency:.4g} rad/s"))
+        rows.append((way, found.place_of(one).removeprefix("at "), pole))
     each = [[[pole.real, pole.imag] for pole in some if pole == pole] for some in found.poles.tolist()]
     crossings = [
-        {"value": x.value, "leaves": x.leaves, "real": x.z.real, "imaginary": x.z.imag, "frequency": x.frequency}
+        {
+            "value": x.value,
+            "until": x.until,
+            "leaves": x.leaves,
+            "real": x.z.real,
+            "imaginary": x.z.imag,
+            "frequency": x.frequency,
+        }
         for x in found.crossings
     ]
     document = {

@@ -28,6 +28,8 @@ HIGHEST = 2.0
 """Largest spectral radius that is drawn"""
 ANGLES = (15.0, 30.0, 45.0, 90.0)
 """Distances of ticks of a phase [°]: the least with which they are few"""
+ROWS = 3
+"""Rows of the labels of crossings, which stand in each in turn"""
 EDGE = 0.25
 """Share of the width, from the left, in which a label stands to the right of its line"""
 LEAST = 1e-12
@@ -60,6 +62,9 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     low, high = middle.get_ylim()
     middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
+    above.secondary_xaxis("top", functions=(lambda w: w / math.tau, lambda f: f * math.tau)).set_xlabel(
+        "frequency [Hz]"
+    )
     middle.set(ylabel="phase of L [°]")
     below.set(ylabel="sensitivity |1 / (1 + L)| [dB]", xlabel="frequency [rad/s], up to half the sampling rate")
     below.set_xlim(result.frequencies[0], result.frequencies[-1])
@@ -151,16 +156,20 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
             axes.plot([one.z.real] * 2, [one.z.imag, -one.z.imag], "x", color=RED, linestyle="none")
         axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
     half = min(MOST, NEAR * float(np.median(np.sort(np.abs(poles - 1.0))[: (len(poles) + 1) // 2])))
-    plane.set(xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN))
+    plane.set(
+        xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), title="×: where poles cross the circle" * bool(result.crossings)
+    )
     close.set(xlim=(1.0 - half, 1.0 + half), ylim=(-half, half), title="about z = 1")
+    close.locator_params(nbins=5)
     figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
     over.plot(across.of(result.curve[0]), result.curve[1], color=BLUE)
     over.axhline(1.0, color=BLACK, linewidth=1.0)
-    for one in result.crossings:
+    for row, one in enumerate(result.crossings):
         at = (float(across.of(one.value)), 1.0)
         over.plot(*at, "x", color=RED)
         left = at[0] > 0.5 * (values[0] + values[-1])
-        beside: dict[str, Any] = {"xytext": (-4.0, 5.0) if left else (4.0, -12.0), "ha": "right" if left else "left"}
+        up = 5.0 + 10.0 * (row % ROWS) if left else -12.0 - 10.0 * (row % ROWS)
+        beside: dict[str, Any] = {"xytext": (-4.0 if left else 4.0, up), "ha": "right" if left else "left"}
         over.annotate(across.text_of(one.value, 4), at, textcoords="offset points", **beside)
     over.set(xlabel=across.title, ylabel="spectral radius", xlim=(values[0], values[-1]))
     low, high = float(result.radius.min()), min(float(result.radius.max()), HIGHEST)

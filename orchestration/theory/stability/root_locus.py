@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -33,6 +34,7 @@ from orchestration.theory.stability.operating_point import (
     beside_others,
     hyperperiod,
     hyperperiod_of,
+    longest_period,
 )
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Complexes, poles_of
@@ -46,6 +48,8 @@ COUNT = 40
 SHARE = 0.2
 """Share of the range of a limit by default, farther than which nearly all loops have long left the circle"""
 MAX_COUNT = 10_000
+ALIKE = 1e-8
+"""Distance of the two sides of a jump of a delay, at most [s]"""
 DIGITS = 6
 """Digits of its values in a sentence"""
 
@@ -57,12 +61,14 @@ class Crossing:
 
     value: float
     """Its value, in the unit of the quantity: where they jump, the last one at which the loop is stable."""
+    until: float
+    """The nearest value that was tried on the other side, up to which they have crossed; the same where none jump."""
     leaves: bool
     """Whether the loop is unstable above it; else below."""
     z: complex
     """The pole on the circle, or the one that has jumped out of it; of a pair the upper one."""
     frequency: float
-    """Its frequency [rad/s]: 0 of a pole at 1, half the sampling rate of one at -1."""
+    """Its frequency [rad/s], up to whole turns in a period: 0 of a pole at 1, half the sampling rate of one at -1."""
 
 
 @passable
@@ -77,7 +83,8 @@ class RootLocus:
     values: Floats
     """Values of the quantity, in rising order, shape (n,)."""
     radius: Floats
-    """The spectral radius at each, shape (n,): below 1 small deviations decay."""
+    """The spectral radius at each, shape (n,): below 1 small deviations decay. Of a period beside others it is per
+    longest period, for that of all rates differs from value to value."""
     poles: Complexes = field(repr=False)
     """The poles at each, shape (n, m), without those at 0, of what is forgotten; where there are fewer, NaN."""
     crossings: tuple[Crossing, ...]
@@ -100,11 +107,14 @@ class RootLocus:
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
             return f"{self.of}: poles {begins} the unit circle from {first} to {last}, {radii} {known}"
-        ways = [
-            f"{'leave' if one.leaves else 'return'} at {shown(one.value)}, {one.frequency:.4g} rad/s"
-            for one in self.crossings
-        ]
+        ways = [f"{'leave' if one.leaves else 'return'} {self.place_of(one)}" for one in self.crossings]
         return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} {known}"
+
+    def place_of(self, crossing: Crossing) -> str:
+        """Where poles cross, in words: at a value, with the frequency, or between two where rates repeat together."""
+        ends = [quantity(value, self.unit, DIGITS) for value in sorted((crossing.value, crossing.until))]
+        jumps = ends[0] != ends[1] and not math.isclose(crossing.value, crossing.until, abs_tol=ALIKE)
+        return f"between {' and '.join(ends)}" if jumps else f"at {ends[0]}, {crossing.frequency:.4g} rad/s"
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
@@ -157,23 +167,33 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         system, known = rested(varied.request), KnownTangents()
         found: dict[float, tuple[Complexes, float]] = {}
 
+        def at(value: float) -> System:
+            return changed(system, dict.fromkeys(varied.paths, value))
+
         def repeats(value: float) -> bool:
-            return hyperperiod_of(changed(system, dict.fromkeys(varied.paths, value))) is not None
+            return hyperperiod_of(at(value)) is not None
 
         if not all(map(repeats, values)):
             raise UsageError(_incommensurate(varied, system, values, repeats))
 
+        beside = beside_others(at, values[0], values[-1])
+
+        def radius_of(value: float) -> float:
+            poles, period = found[value]
+            share = 1.0 if beside is None else float(longest_period(at(value))) / NANOSECONDS / period
+            return float(np.abs(poles).max(initial=0.0) ** share)
+
         def radius(value: float) -> float:
             if value in found:
-                return _radius(found[value][0])
+                return radius_of(value)
             try:
-                with whole_at_rest(changed(system, dict.fromkeys(varied.paths, value)), instances, known=known) as loop:
+                with whole_at_rest(at(value), instances, known=known) as loop:
                     found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
             except UsageError as error:
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
-            return _radius(found[value][0])
+            return radius_of(value)
 
-        short, tried = _shortening(varied, system, values, unit), _beside_jumps(varied, system, values)
+        short, tried = _shortening(beside, unit), _beside_jumps(varied, system, values)
         crossings = list[Crossing]()
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
@@ -184,25 +204,21 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 if (high < 1.0) != (above < 1.0):
                     ends = ((tried[place], high - 1.0), (tried[place + 1], above - 1.0))
                     inside, outside = zero_between(lambda value: radius(value) - 1.0, short, *ends)
-                    crossings.insert(0, _crossing(inside, *found[outside], leaves=high < 1.0))
+                    crossings.insert(0, _crossing(inside, outside, *found[outside], leaves=high < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
     for row, known_poles in zip(poles, each, strict=True):
         row[: len(known_poles)] = known_poles
-    curve = np.array([(value, _radius(found[value][0])) for value in sorted(found)]).T
+    curve = np.array([(value, radius_of(value)) for value in sorted(found)]).T
     return RootLocus(
-        of=varied.of, unit=unit, values=np.array(values), radius=np.array([_radius(one) for one in each]), poles=poles,
-        crossings=tuple(crossings), curve=curve, precision=precision_of(one for _, _, one in known.values()),
+        of=varied.of, unit=unit, values=np.array(values), radius=np.array([radius_of(value) for value in values]),
+        poles=poles, crossings=tuple(crossings), curve=curve,
+        precision=precision_of(one for _, _, one in known.values()),
     )  # fmt: skip
 
 
-def _radius(poles: Complexes) -> float:
-    return float(np.abs(poles).max(initial=0.0))
-
-
-def _shortening(varied: Varied, system: System, values: list[float], unit: str | None) -> Callable[[float], float]:
-    """The function to the nearest value that is tried: of a period beside others one at which they coincide."""
-    beside = beside_others(lambda value: changed(system, dict.fromkeys(varied.paths, value)), values[0], values[-1])
+def _shortening(beside: tuple[list[Fraction], float] | None, unit: str | None) -> Callable[[float], float]:
+    """The function to the nearest value that is tried: of a period `beside` others one at which they coincide."""
     if beside is None:
         return lambda value: _short(value, unit)
     whole = hyperperiod(beside[0])
@@ -251,6 +267,8 @@ def _short(value: float, unit: str | None) -> float:
     return round(value, 9) if unit == "s" else float(f"{value:.9g}")
 
 
-def _crossing(value: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:
+def _crossing(value: float, until: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:
     pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
-    return Crossing(value=value, leaves=leaves, z=pole, frequency=abs(math.atan2(pole.imag, pole.real)) / period)
+    return Crossing(
+        value=value, until=until, leaves=leaves, z=pole, frequency=abs(math.atan2(pole.imag, pole.real)) / period
+    )

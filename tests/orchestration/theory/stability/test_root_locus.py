@@ -9,6 +9,7 @@ import pytest
 
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.paths import changed
+from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
 from quadcosim import UsageError, bode, linearise, locus
 from tests.commands import Main
@@ -67,11 +68,16 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
     found = locus(both, period, first=0.008, last=0.024, count=2)
     (crossing,) = found.crossings
     assert crossing.leaves
+    assert crossing.until == pytest.approx(crossing.value + 0.0004)
+    assert f"leave between {1e3 * crossing.value:g} ms and {1e3 * crossing.until:g} ms (small" in found.verdict
     before, after = (
-        linearise(changed(both, {period: round(crossing.value + later, 9)}), "controller").radius
-        for later in (0.0, 0.0004)
+        linearise(changed(both, {period: value}), "controller").radius for value in (crossing.value, crossing.until)
     )
     assert before < 1.0 < after
+    of_all = hyperperiod_of(changed(both, {period: crossing.until}))
+    assert of_all is not None
+    (per_longest,) = found.curve[1][found.curve[0] == crossing.until]
+    assert per_longest == pytest.approx(after ** (1e9 * max(crossing.until, 0.008) / float(of_all)), rel=1e-6)
 
 
 def test_a_locus_of_one_value_is_refused() -> None:
