@@ -96,6 +96,9 @@ def fly(
         reason = _reason_unavailable(fits.system, models, in_process)
         if reason and runs.count > 1 and IN_PROCESS in reason:
             warn(f"{runs.count} runs one by one, each in a process of its own: {reason}")
+        for name in ("time", "row"):
+            if record and name in runs.axes:
+                raise UsageError(f"values: a dimension is called {name}, as that of what is recorded: expected another")
         table = _Table(runs, names, record)
         if workers > 1:
             rows = _by_workers(runs, fits.parameters, record, workers, in_lanes=reason is None)

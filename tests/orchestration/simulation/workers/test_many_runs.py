@@ -172,6 +172,13 @@ def test_the_index_of_a_table_and_the_dimensions_of_arrays_are_kept() -> None:
     assert found.to_xarray()["steps"].sel(side="left").sizes == {"w": 3}
 
 
+def test_a_dimension_of_the_values_has_not_the_name_of_that_of_the_rows() -> None:
+    values = {X: xr.DataArray([0.0, 1.0], dims="time")}
+    assert quadcosim.fly(SHORT, values, outputs=["good"]).to_xarray()["good"].sizes == {"time": 2}
+    with pytest.raises(QuadcosimError, match=r"^values: a dimension is called time, as that of what is recorded"):
+        quadcosim.fly(SHORT, values, record=["plant.position.x"])
+
+
 NAMED = xr.DataArray([0.0, 1.0], {"side": ["left", "right"]}, "side")
 OTHERWISE: list[tuple[dict[str, Any], str]] = [
     ({X: pd.Series([0.0, 1.0]), Y: pd.Series([0.0, 1.0], [1, 0])}, rf"^values of {Y}: index has other labels than bef"),
