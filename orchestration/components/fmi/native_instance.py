@@ -245,7 +245,10 @@ class NativeInstance(Instance):
         self._expect_alive()
         variable = self.variable(name)
         if variable.causality == "structuralParameter":
-            raise UsageError(f"{self.name}.{name}: is a structural parameter, which is not supported")
+            raise UsageError(
+                f"{self.name}.{name}: is a structural parameter; expected none, as arrays keep the sizes by its start "
+                f"value, {variable.start}: another size takes another FMU"
+            )
         converted = convert_value(variable, value, f"{self.name}.{name}")
         self._initial_values[name] = converted
         self._put(variable, converted)

@@ -168,7 +168,10 @@ def expect_traceable(fmu: Path) -> None:
     """Raise `UsageError` for an FMU without a traced copy that other masters load here."""
     model = read_model(fmu)
     if model.version != 2:
-        raise UsageError(f"{fmu}: FMI {model.description.fmiVersion}; expected FMI 2.0 to trace it in other masters")
+        raise UsageError(
+            f"{fmu}: FMI {model.description.fmiVersion}; expected FMI 2.0 to trace it in other masters; the CSV of "
+            "quadcosim run MODEL.fmu --output FILE is that of fmpy simulate, of either"
+        )
     if compiler() is None:
         raise UsageError(f"{fmu}: expected a C compiler called cc, on Linux (x86_64), to trace it in other masters")
     with zipfile.ZipFile(fmu) as archive:

@@ -271,7 +271,10 @@ def _expect_period(system: System) -> Fraction:
             raise UsageError(f"{name} has its own clock")
     period = hyperperiod_of(system)
     if period is None:
-        raise UsageError("the sampled components have no hyperperiod within twenty of the longest period")
+        raise UsageError(
+            "the sampled components have no hyperperiod within twenty of the longest period: expected periods in "
+            "ratios of small whole numbers"
+        )
     return period
 
 

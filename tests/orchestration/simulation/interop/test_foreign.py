@@ -128,7 +128,7 @@ def test_what_stands_in_the_way_is_named(tmp_path: Path, monkeypatch: pytest.Mon
             trace.expect_traceable(fmu)
         return str(refusal.value).removeprefix(f"{fmu}: ")
 
-    assert refused(small(tmp_path / "3", fmi=3)) == "FMI 3.0; expected FMI 2.0 to trace it in other masters"
+    assert refused(small(tmp_path / "3", fmi=3)).startswith("FMI 3.0; expected FMI 2.0 to trace it in other masters; ")
     empty = described(tmp_path, "Empty", outputs={"y": "Real"})
     assert refused(empty) == "has no binaries/linux64/Empty.so; expected one to run it here"
     monkeypatch.setattr(trace, "compiler", lambda: None)
