@@ -113,19 +113,15 @@ class Unit:
     options: tuple[str, ...] = ()
 
 
-def linked_here(units: Sequence[Unit], options: Sequence[str] = ()) -> bytes:
-    """The library for this machine of several units; raises `PackagingError` without a compiler."""
-    return _linked([compiler()], [*OPTIONS, *_LINUX, *options], units, ["-lm"])
-
-
 def linked_for_wasm(units: Sequence[Unit], options: Sequence[str] = ()) -> bytes:
     """The WebAssembly module of several units, compiled by zig; raises `PackagingError` where there is none."""
     if importlib.util.find_spec("ziglang") is None:
         raise PackagingError("a page needs zig, which compiles for WebAssembly: pip install 'quadcosim[live]'")
-    return _linked([sys.executable, "-m", "ziglang", "cc", *_WASM], [*_WASM_OPTIONS, *options], units, [])
+    return linked([sys.executable, "-m", "ziglang", "cc", *_WASM], [*_WASM_OPTIONS, *options], units, [])
 
 
-def _linked(command: list[str], options: Sequence[str], units: Sequence[Unit], after: Sequence[str]) -> bytes:
+def linked(command: list[str], options: Sequence[str], units: Sequence[Unit], after: Sequence[str]) -> bytes:
+    """The library of several units by the command of a compiler, with its further arguments `after` the units."""
     for_units = [option for option in options if not option.startswith("-Wl,") and option not in ("-shared", "-s")]
     objects = {}
     for i, unit in enumerate(units):

@@ -6,6 +6,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
@@ -115,9 +116,14 @@ def quadrotor() -> System:
 
 def in_scenario_terms(text: str) -> str:
     """`text` with the paths of the system replaced by the names of a scenario."""
-    for path, name in SCENARIO_NAMES.items():
+    for path, name in _scenario_names().items():
         text = text.replace(path, name)
     return text
+
+
+@functools.cache
+def _scenario_names() -> dict[str, str]:
+    return read_toml(Path(__file__).with_name("scenario_names.toml"), "names in scenarios")
 
 
 def reference_source(choice: ReferenceChoice) -> dict[str, Any]:
@@ -177,36 +183,6 @@ def paths_of(target: str) -> tuple[str, ...]:
         f"timing.loss, timing.noise.NAME, timing.quantisation.NAME or timing.KEY with KEY one of {', '.join(_SINGLE)}"
     )
 
-
-SCENARIO_NAMES = {
-    "components.controller.parameters.": "controller.",
-    "components.plant.parameters.": "plant.",
-    "components.controller.record": "record.controller",
-    "components.plant.record": "record.plant",
-    "components.controller.sampling.": "timing.",
-    "components.controller.": "controller.",
-    "components.plant.step": "timing.plant_interval",
-    "components.plant.": "plant.",
-    "connections.measurement.from": "plant.fmu",
-    "connections.measurement.to": "controller.fmu",
-    "connections.command.from": "controller.fmu",
-    "connections.command.to": "plant.fmu",
-    "connections.measurement.noise": "timing.noise",
-    "connections.measurement.quantisation": "timing.quantisation",
-    "connections.measurement.loss": "timing.measurement_loss",
-    "connections.command.loss": "timing.command_loss",
-    "connections.measurement.burst_length": "timing.burst_length",
-    "connections.command.": "timing.",
-    "sources.reference.signal": "reference.name",
-    "sources.reference.parameters.": "reference.",
-    "sources.reference.": "reference.",
-    "sources.reference:": "reference:",
-    "sources.disturbance.signal": "disturbance.name",
-    "sources.disturbance.scale": "disturbance.drag",
-    "sources.disturbance.parameters.": "disturbance.",
-    "sources.disturbance.": "disturbance.",
-}
-"""Names in a scenario by the beginnings of paths in its system"""
 
 SIGNAL_KEYS = {
     "reference": {"name": "signal", "file": "file"},

@@ -1,5 +1,6 @@
 """The style of figures: sizes, fonts and lines; and how files of them are written."""
 
+import functools
 import textwrap
 import warnings
 from collections.abc import Iterator, Mapping
@@ -89,48 +90,39 @@ class Style:
         with matplotlib.rc_context(), warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Glyph .* missing from font")
             matplotlib.rcdefaults()
+            matplotlib.rcParams.update(_shared_settings())
             matplotlib.rcParams.update(self._settings())
             yield
 
     def _settings(self) -> dict[str, Any]:
         small = 0.85 * self.font
         return {
-            "axes.axisbelow": True,
-            "axes.grid": True,
             "axes.labelsize": self.font,
             "axes.linewidth": 0.06 * self.font,
             "axes.prop_cycle": cycler(color=CYCLE),
-            "axes.spines.right": False,
-            "axes.spines.top": False,
             "axes.titlesize": self.font,
-            "figure.constrained_layout.use": True,
             "figure.constrained_layout.h_pad": 0.3 * self.font / 72.0,
             "figure.constrained_layout.w_pad": 0.3 * self.font / 72.0,
             "figure.dpi": self.dpi,
             "figure.labelsize": self.font,
             "figure.titlesize": self.font,
             "font.family": "serif" if self.serif else "sans-serif",
-            "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"],
-            "font.serif": ["STIXGeneral", "STIX Two Text", "Times New Roman", "Times", "serif"],
             "font.size": self.font,
-            "grid.alpha": 0.3,
             "grid.linewidth": 0.05 * self.font,
             "hatch.linewidth": 0.06 * self.font,
             "legend.fontsize": small,
-            "legend.frameon": False,
-            "legend.handlelength": 1.8,
             "legend.title_fontsize": small,
             "lines.linewidth": self.line,
             "lines.markersize": 0.45 * self.font,
             "mathtext.fontset": "stix" if self.serif else "dejavusans",
-            "pdf.fonttype": 42,  # text stays text, its font embedded
-            "ps.fonttype": 42,
-            "savefig.dpi": "figure",
-            "svg.fonttype": "none",
-            "svg.hashsalt": "quadcosim",  # the same data, the same bytes
             "xtick.labelsize": small,
             "ytick.labelsize": small,
         }
+
+
+@functools.cache
+def _shared_settings() -> matplotlib.RcParams:
+    return matplotlib.rc_params_from_file(Path(__file__).with_name("every.mplstyle"), use_default_template=False)
 
 
 STYLES: Mapping[str, Style] = {

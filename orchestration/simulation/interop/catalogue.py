@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.processes import subprocesses
 from orchestration.simulation.interop.job import Job, Rows
@@ -80,31 +81,8 @@ COFMUPY = "QUADCOSIM_COFMUPY"
 """path of a Python with cofmupy, which requires other versions of fmpy and pythonfmu than this project"""
 
 TOOLS = {
-    tool.name: tool
-    for tool in (
-        Tool(name="libcosim", packages=("libcosimpy",), call="libcosim:run"),
-        Tool(name="libcosim, SSP", packages=("libcosimpy",), call="libcosim:run_ssp"),
-        Tool(name="ecos", packages=("ecospy", "tbb"), call="ecos:run"),
-        Tool(name="ecos, SSP", packages=("ecospy", "tbb"), call="ecos:run_ssp"),
-        Tool(name="fmpy, SSP", packages=("fmpy",), call="fmpy:run_ssp"),
-        Tool(name="fmucontainer", packages=("fmu-manipulation-toolbox",), call="container:run_jacobi", converts=True),
-        Tool(
-            name="fmucontainer -sequential",
-            packages=("fmu-manipulation-toolbox",),
-            call="container:run_sequential",
-            converts=True,
-        ),
-        Tool(name="cofmupy", packages=("cofmupy",), call="cofmupy:run_jacobi", python=COFMUPY, sets_reals_only=True),
-        Tool(
-            name="cofmupy gauss_seidel",
-            packages=("cofmupy",),
-            call="cofmupy:run_gauss_seidel",
-            python=COFMUPY,
-            sets_reals_only=True,
-        ),
-        Tool(name="fmpy, plant alone", packages=("fmpy",), call="fmpy:run_plant", alone="plant"),
-        Tool(name="fmpy, controller alone", packages=("fmpy",), call="fmpy:run_controller", alone="controller"),
-    )
+    name: Tool(name=name, **{**keys, "packages": tuple(keys["packages"])})
+    for name, keys in read_toml(Path(__file__).with_suffix(".toml"), "catalogue of tools").items()
 }
 
 

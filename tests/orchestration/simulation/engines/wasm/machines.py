@@ -1,6 +1,7 @@
 """The module of a page, called from Python: as a library of this machine, or by wasmtime."""
 
 import ctypes
+import functools
 import hashlib
 import struct
 from decimal import Decimal
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit import libraries
-from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, linked_here
+from fmu_kit.compiler.pack.c_compiler import FOR_THIS_PROCESSOR, OPTIONS, compiler, linked
 from orchestration.components.fmi.read_description import read_model
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.resolved import check_against_fmus
@@ -37,7 +38,8 @@ def library_of(tables: SystemTables) -> Path:
     """The module of one lane as a library of this machine."""
     units, options = units_of(tables, 1), (*FOR_THIS_PROCESSOR, "-Wno-psabi")
     what = ("live", options, tuple(unit.options for unit in units))
-    return libraries.cached_library("live", sources_in(units), what, lambda: linked_here(units, options))
+    made = functools.partial(linked, [compiler()], [*OPTIONS, *options], units, ["-lm"])
+    return libraries.cached_library("live", sources_in(units), what, made)
 
 
 def decimal_of(value: float) -> tuple[int, int]:
