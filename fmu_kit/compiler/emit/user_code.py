@@ -83,6 +83,8 @@ class UserCode:
     defines: tuple[str, ...]
     sanitize: bool
     """whether what C leaves undefined traps"""
+    in_double: bool = False
+    """whether its floats are doubles"""
     headers: tuple[Code, ...]
     declare: Code | None
     init: Code | None
@@ -197,7 +199,7 @@ _IS_NUMBER_CXX = "static_assert(quadcosim_one<decltype({lvalue})>::is, {told});"
 # No macros, in whose place an error would have no line of the user's.
 _TO_C = (
     "{{ const double quadcosim_x = {value}; "
-    "if (_Generic(({lvalue}), float: 1, double: 1, long double: 1, default: 0)) {lvalue} = quadcosim_x; "
+    "if (__builtin_classify_type({lvalue}) == 8) {lvalue} = quadcosim_x; "
     # Integers are rounded, also those in bit fields, of which only the compiler knows that they are some.
     "else {{ if (quadcosim_x > -9e18 && quadcosim_x < 9e18) "
     "{lvalue} = (long long)(quadcosim_x < 0.0 ? quadcosim_x - 0.5 : quadcosim_x + 0.5); "

@@ -26,7 +26,7 @@ def source_hash(target: Target, version: int = 2) -> str:
 def wrapping_hash() -> str:
     """The hash of what is put around a user's own C."""
     digest = hashlib.sha256()
-    packing = ("pack/user_objects.py", "pack/wrapping.py", "emit/user_code.py")
+    packing = ("pack/in_double.py", "pack/user_objects.py", "pack/wrapping.py", "emit/user_code.py")
     for path in (*sorted(FOLDER.glob("*.[ch]")), *(_COMPILER / name for name in packing)):
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -16,6 +16,7 @@ from pathlib import Path
 from fmu_kit.bundle import PackagingError
 from fmu_kit.compiler.emit.user_code import CXX, UserCode
 from fmu_kit.compiler.pack.c_compiler import compiler, output_of
+from fmu_kit.compiler.pack.in_double import MATHEMATICS, in_double
 
 SECTION = "quadcosim_state"
 _OPTIONS = (
@@ -29,6 +30,8 @@ _CHECKS = (
 )
 _LIBRARY = (".a", ".o")
 """Endings of sources that are compiled already, such as static libraries of Rust"""
+_COMPILED = (*_LIBRARY, ".s", ".S")
+"""Those, and of assembler"""
 
 
 class RefusedCodeError(PackagingError):
@@ -50,11 +53,6 @@ class Objects:
     """warnings of the compiler, as PLACE: TEXT, those of what is unused last"""
 
 
-_MATHEMATICS = (
-    "acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim floor fma "
-    "fmax fmin fmod frexp hypot ilogb ldexp lgamma llrint llround log log10 log1p log2 logb lrint lround modf nan "
-    "nearbyint nextafter pow remainder remquo rint round scalbn sin sincos sinh sqrt tan tanh tgamma trunc"
-)
 _OTHERS = (
     "memcpy memmove memset memcmp memchr strlen strcmp strncmp strcpy strncpy strcat strncat strchr strstr abs labs "
     "llabs div ldiv abort qsort bsearch __assert_fail __errno_location __stack_chk_fail _GLOBAL_OFFSET_TABLE_ "
@@ -62,7 +60,7 @@ _OTHERS = (
     "__cxa_guard_release __gxx_personality_v0 __isnan __isinf __finite __fpclassify __signbit __isnanf __isinff "
     "__finitef __fpclassifyf"
 )
-_PURE = frozenset([f"{name}{kind}" for name in _MATHEMATICS.split() for kind in ("", "f", "l")] + _OTHERS.split())
+_PURE = frozenset([f"{name}{kind}" for name in MATHEMATICS.split() for kind in ("", "f", "l")] + _OTHERS.split())
 _PURE_KINDS = re.compile(r"_ZTVN10__cxxabiv1|__(add|sub|mul|div|mod|neg|fix|float|ext|trunc|u?div|u?mod)\w*[sdtx][fi]")
 """Type information of C++, arithmetic of the compiler's own library"""
 _HEAP = re.compile(r"malloc$|calloc$|realloc$|free$|aligned_alloc$|posix_memalign$|_Zn[wa]m|_Zd[la]Pv")
@@ -95,12 +93,21 @@ def build_objects(code: UserCode, user: Path, folder: Path) -> Objects:
         path = Path(code.folder, source)
         if not path.is_file():
             raise RefusedCodeError(f"{code.file}: sources: {source}: no such file in {code.folder}")
+        if code.in_double and path.suffix in _COMPILED:
+            raise RefusedCodeError(f"{code.file}: sources: {source}: expected its C, of which floats become doubles")
         if path.suffix in _LIBRARY:
             libraries.append(path)
             read.append(str(path))
             continue
         target = folder / f"{number}.o"
-        said = _run(code, [*_compiler_of(path), *_options(code, folder), "-MMD", "-c", path, "-o", target], folder)
+        command, rule = [*_compiler_of(path), *_options(code, folder)], ["-MMD", "-MF", target.with_suffix(".d")]
+        if code.in_double:
+            preprocessed = folder / f"{number}{'.ii' if path.suffix in CXX else '.i'}"
+            _run(code, [*command, *rule, "-DQUADCOSIM_IN_DOUBLE", "-E", path, "-o", preprocessed], folder)
+            text = preprocessed.read_text(encoding="utf-8", errors="surrogateescape")
+            preprocessed.write_text(in_double(text), encoding="utf-8", errors="surrogateescape")
+            command, rule, path = [*command, "-w"], [], preprocessed
+        said = _run(code, [*command, *rule, "-c", path, "-o", target], folder)
         warnings += _warnings(code, said)
         read += [name for name in _prerequisites(target.with_suffix(".d")) if name != str(user)]
         compiled.append(target)

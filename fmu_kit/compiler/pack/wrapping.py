@@ -218,7 +218,7 @@ def _record(code: UserCode, objects: Objects) -> dict[str, bytes]:
     read = {
         os.path.relpath(path, code.folder): hashlib.sha256(Path(path).read_bytes()).hexdigest() for path in objects.read
     }
-    record = {"toml": code.hash, "kit": wrapping_hash(), "period": code.period, "read": read}
+    record = {"file": code.file, "toml": code.hash, "kit": wrapping_hash(), "period": code.period, "read": read}
     return {WRAPPED_FILE: json.dumps(record, indent=1).encode()}
 
 

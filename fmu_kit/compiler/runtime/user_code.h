@@ -6,7 +6,9 @@ template <class T> struct quadcosim_real {
     static T of(double x) { return (T)x; }
     static bool has(double, double) { return true; }
 };
+#ifndef QUADCOSIM_IN_DOUBLE
 template <> struct quadcosim_kind<float> : quadcosim_real<float> {};
+#endif
 template <> struct quadcosim_kind<double> : quadcosim_real<double> {};
 template <class T> struct quadcosim_kind<T &> : quadcosim_kind<T> {};
 template <class T> struct quadcosim_one { enum { is = 1 }; };

@@ -21,7 +21,7 @@ import keyword
 import logging
 import re
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
 from math import gcd, isfinite, lcm
@@ -212,6 +212,49 @@ def is_out_of_date(fmu: Path, path: Path) -> bool:
     return any(_hash_of(path.parent / name) != known for name, known in read.items())
 
 
+def in_double(fmu: str) -> Path | None:
+    """The FMU of the same code with its floats as doubles, made once in the user's cache; `fmu` as for `fmus.locate`.
+
+    None for any other, for code without floats, and for an FMU without its file and sources beside it, or with those
+    of another. Raises `UsageError` for code that cannot be compiled so.
+    """
+    from fmu_kit.compiler.pack.in_double import has_floats
+
+    path = Path(fmu)
+    made = locate(path) if path.suffix == WRAPPED else path
+    stored = read_wrapped(made) if made.suffix == ".fmu" else None
+    if stored is None:
+        return None
+    folder = made.parent.parent if made.parent.name == FMI3 else made.parent
+    file = folder / stored["file"] if "file" in stored else described_by(path)[0]
+    if is_out_of_date(made, file) or not any(map(has_floats, _texts(file, stored["read"]))):
+        return None
+    twin = in_double_folder() / hashlib.sha256(made.read_bytes()).hexdigest() / made.name
+    if not twin.is_file():
+        try:
+            twin.parent.mkdir(parents=True, exist_ok=True)
+            build(file, twin, version=3 if made.parent.name == FMI3 else 2, in_double=True)
+        except UsageError as error:
+            raise UsageError(f"the linear theory takes floats in double precision, and {error}") from None
+        except OSError as error:
+            raise QuadcosimError(f"{twin}: expected a place for the code in double precision: {error}") from None
+    return twin
+
+
+def in_double_folder() -> Path:
+    """The folder of FMUs in double precision."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("quadcosim")) / "double"
+
+
+def _texts(file: Path, read: Iterable[str]) -> Iterator[str]:
+    """The file of a controller, and the sources and headers that were read for its FMU."""
+    for path in (file, *(file.parent / name for name in read)):
+        if path.suffix not in (".a", ".o"):
+            yield path.read_text(encoding="utf-8", errors="replace")
+
+
 def _hash_of(path: Path) -> str | None:
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -219,14 +262,23 @@ def _hash_of(path: Path) -> str | None:
         return None
 
 
-def build(path: Path, out: Path, *, version: int = 2, systems: str | None = None, sanitize: bool = False) -> Path:
+def build(
+    path: Path,
+    out: Path,
+    *,
+    version: int = 2,
+    systems: str | None = None,
+    sanitize: bool = False,
+    in_double: bool = False,
+) -> Path:
     """Make the FMU `out` of a file, in a separate process, since the code runs for its start values.
 
-    With `sanitize` the code is checked while it runs, also where its file does not say so.
+    With `sanitize` the code is checked while it runs, also where its file does not say so; `in_double` its floats are
+    doubles.
     Raises `UsageError` for code that cannot be wrapped as it is, naming line and symbol, and `QuadcosimError` for what
     is missing here.
     """
-    content = json.dumps({**description_of(path), **({"sanitize": True} if sanitize else {})})
+    content = json.dumps({**description_of(path), "in_double": in_double, **({"sanitize": True} if sanitize else {})})
     if version == 3:
         _expect_names_of_clocks(path)
     done = subprocess.run(

@@ -60,11 +60,6 @@ def certified_loop(rest: AtRest) -> CertifiedLoop:
     components: Components = {}
     for name, component in system.components.items():
         tangent = of_one_rate(rest.tangents[name])
-        if tangent.precision:
-            raise UsageError(
-                f"{name}: rounds as code in single precision, and is known to {tangent.precision:.1g}: expected one in "
-                "double precision, for a proof"
-            )
         if component.sampling is not None:
             found = of_samples(tangent, component.sampling.period)
             varies = rest.simulation.instances[name].model.varies_step

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
+from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import at_rest
 
@@ -64,6 +65,8 @@ class Certified:
     """The size of the state from period to period."""
     certificate: str | None = None
     """The proof, as the text of a file that `check` verifies."""
+    in_double: tuple[str, ...] = ()
+    """The components whose float code in C is taken in double precision."""
 
     @property
     def verdict(self) -> str:
@@ -83,7 +86,7 @@ class Certified:
         best = ""
         if self.small_gain is not None and self.small_gain > (self.certified or 0.0):
             best = f"up to {shown(self.small_gain)} is stable by the small-gain bound, without a certificate; "
-        return f"{self.of}: {best}{proved}, {broken} (small deviations)"
+        return f"{self.of}: {best}{proved}, {broken} (small deviations{of_code(self.in_double)})"
 
     def __post_init__(self) -> None:
         """Raise `RuntimeError` for what cannot be: a value that is proved to be stable, and breaks the loop."""
@@ -119,7 +122,8 @@ def margin(request: RequestLike, of: str, *, progress: ShareProgress = None) -> 
     loop = linear_loop_of(request)
     timeline = LoopTimeline(loop, [varying])
     with share_reporter(progress, "certifying") as report:
-        return (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, report)
+        found = (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, report)
+    return replace(found, in_double=are_in_double(loop.system.components))
 
 
 def linear_loop_of(request: Request) -> CertifiedLoop:
@@ -242,6 +246,7 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
         of=cause.path, certified=value, breaking=search.breaking,
         breaking_sequence=search.sequence, largest=largest, searched=search.searched,
         states=len(scheduled.family(0.0).kept), certificate=certificate,
+        in_double=are_in_double(loop.system.components),
     )  # fmt: skip
 
 

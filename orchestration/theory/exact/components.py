@@ -10,6 +10,7 @@ import json
 from dataclasses import asdict, dataclass, replace
 
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.lifted_component import of_one_rate, several_rates
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
@@ -42,8 +43,8 @@ class IdentifiedComponent:
     accuracy: float
     """Accuracy of its responses, relative"""
     precision: float
-    """Accuracy of each sample, whose errors add up, of a component that rounds coarsely, or whose coordinates are
-    nearly dependent; 0 of others"""
+    """Accuracy of each sample, whose errors add up, of a component whose coordinates are nearly dependent; 0 of
+    others"""
     tangent: Tangent
     """whose coordinates its state has"""
 
@@ -87,7 +88,7 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
     tangent = of_one_rate(loop.tangent(name))
-    is_linear, precision = tangent.accuracy <= SAME, tangent.precision
+    is_linear, precision = tangent.accuracy <= SAME, 0.0
     part: Continuous | SampledSystem
     if component.sampling is not None:
         part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
@@ -96,11 +97,12 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
         if is_linear and tangent.rounding <= DIFFERS:
             allowed = DIFFERS
         elif is_linear:
-            precision = max(precision, tangent.rounding)
+            precision = tangent.rounding
             allowed = min(tangent.rounding, INEXACT)
         matrices = in_continuous_time(tangent, step, allowed, component.step)
         part = replace(matrices, step=tangent.derivatives)
     method = "saved states, to rounding" if is_linear else "saved states, by differences"
+    method += of_code(are_in_double({name: component}))
     accuracy = max(ROUNDING, tangent.accuracy)
     return IdentifiedComponent(part=part, method=method, accuracy=accuracy, precision=precision, tangent=tangent)
 

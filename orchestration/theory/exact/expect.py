@@ -37,7 +37,7 @@ class Expected:
     compute."""
     accuracy: float
     """Accuracy of the results, relative: the change by the last refinement, and the accuracy of the components.
-    Errors of those that round coarsely, as in single precision, add up over the hyperperiods that a loop remembers."""
+    Errors of those whose coordinates are nearly dependent add up over the hyperperiods that a loop remembers."""
     method: str
     """Method by which the components were identified, and by which the result was computed."""
     period: float

@@ -54,7 +54,7 @@ class Linear:
     accuracy: float
     """Accuracy of the responses of the least accurately identified one, relative"""
     precision: float
-    """Likewise of those that round coarsely, as in single precision; 0: there are none"""
+    """Accuracy of each sample of those whose coordinates are nearly dependent; 0: there are none"""
     objectives: ObjectiveMeans
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""

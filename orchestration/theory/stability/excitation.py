@@ -1,13 +1,11 @@
 """An instance at rest, whose inputs are pulsed, and which is followed from saved states.
 
 Small deviations are linear as far as pulses of two sizes agree: this determines the size of pulses and how long a
-response is followed. Code that rounds more than double precision does, as in single precision, drowns small pulses. It
-gets large ones, of several sizes, of which the linear part is taken.
+response is followed. What rounds more than double precision does drowns small pulses, and is refused.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -33,24 +31,14 @@ NONLINEAR = 1e-9
 LEAST = 3.0
 """Factor of the least difference that any size has, up to which it is linear, too"""
 ROUNDING = float(np.finfo(float).eps)
-SINGLE = float(np.finfo(np.float32).eps)
 COARSE = 1e-5
 """Difference of responses to small pulses, relative, from which an instance is taken to round coarsely"""
 COARSER = 1e-11
 """Difference of the outputs then, which double precision rounds by less"""
-QUANTISED = 1e-5
-"""Difference of the outputs that no rounding of single precision explains"""
 STANDS_OUT = 10.0
 """Factor on errors: what is larger is none"""
 DITHER = (1.0, 1.137, 1.291, 1.443)
 """Factors of the pulses that show it: rounded alike at two sizes, responses may agree by chance"""
-SIZES = np.linspace(0.3, 1.0, 6)
-"""Factors of the large pulses"""
-LINEAR_PART = np.linalg.pinv(np.stack([SIZES, SIZES**3], axis=1))[0]
-"""Weights of the responses to them: the linear part of odd cubic functions that are fitted to them"""
-LARGE_PULSE = 0.01
-LARGE_FACTORS = np.geomspace(0.03, 30.0, 13)
-"""Factors of the large pulse of each input that are tried"""
 FOLLOWS = 0.05
 """Share of the largest response of an output, from which it follows an input"""
 LARGER = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
@@ -96,8 +84,9 @@ class SavedState:
     """Time of the next step [s]"""
 
 
-States = tuple[SavedState, ...]
-"""States after a pulse up and one down, of each size"""
+States = tuple[SavedState, SavedState]
+"""States after a pulse up and one down"""
+MOVES = (1.0, -1.0)
 
 
 class ImpreciseError(UsageError):
@@ -126,7 +115,6 @@ class Excitation:
     def __init__(self, rest: Rest) -> None:
         self.inputs, self.outputs = rest.inputs, rest.outputs
         self.pulse, self.largest = PULSE, MAX_DEVIATION
-        self.sizes, self.parts = np.ones(1), np.ones(1)
         self.scale = np.maximum(1.0, np.abs(rest.held))
         self._fmu, self.held, self._inputs_now = rest.fmu, rest.held, rest.held.copy()
         self._write = rest.fmu.writer(rest.inputs, self._inputs_now)
@@ -154,27 +142,11 @@ class Excitation:
         """Take the pulses of another excitation, of one or several samples of it."""
         samples = len(self.inputs) // len(other.inputs) if other.inputs else 1
         self.pulse, self.largest, self.scale = other.pulse, other.largest, np.tile(other.scale, samples)
-        self.sizes, self.parts = other.sizes, other.parts
 
     @property
     def pulses(self) -> Floats:
         """The pulse of each input."""
         return self.pulse * self.scale
-
-    @property
-    def is_coarse(self) -> bool:
-        """Whether the instance rounds coarsely, and is measured by large pulses."""
-        return len(self.sizes) > 1
-
-    @property
-    def moves(self) -> list[float]:
-        """The factors of the pulses up and down, of each size."""
-        return [sign * float(size) for size in self.sizes for sign in (1.0, -1.0)]
-
-    def apart(self, followed: Sequence[Floats]) -> Floats:
-        """Twice the linear part of what follows after the `moves`."""
-        halves = [part * (up - down) for part, up, down in zip(self.parts, followed[::2], followed[1::2])]
-        return np.asarray(sum(halves[1:], halves[0]))
 
     def pulsed(self, i: int, factor: float) -> Floats:
         """The inputs with a pulse on one of them, times `factor`."""
@@ -222,12 +194,13 @@ class Excitation:
 
     def futures(self, states: States, rungs: Sequence[Rung]) -> Floats:
         """What outputs do from a state, the inputs at rest: their differences at the end of each rung, in a row."""
-        apart = self.apart([self.outputs_after(state, rungs) for state in states])
-        return np.asarray((apart / self.weight).ravel() / (2.0 * self.pulse))
+        up, down = (self.outputs_after(state, rungs) for state in states)
+        return np.asarray(((up - down) / self.weight).ravel() / (2.0 * self.pulse))
 
     def after_pulse(self, i: int, rung: Rung) -> States:
         """The states after a pulse on an input over a rung."""
-        return tuple(self.stepped(self.rest, rung, self.pulsed(i, move))[1] for move in self.moves)
+        up, down = (self.stepped(self.rest, rung, self.pulsed(i, move))[1] for move in MOVES)
+        return up, down
 
     def response(self, i: int, rungs: Sequence[Rung], *, factor: float = 1.0, lasting: bool = False) -> Floats:
         """The response to a pulse on an input over the first rung, or all, shape (n, outputs); n ends with a large one.
@@ -235,7 +208,7 @@ class Excitation:
         The pulse is multiplied by `factor`, and the response divided by it.
         """
         courses = []
-        for move in self.moves:
+        for move in MOVES:
             pulsed = self.pulsed(i, factor * move)
             later = pulsed if lasting else self.held
             legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
@@ -247,7 +220,7 @@ class Excitation:
         if len(set(rungs)) > 1:
             return self.response(i, rungs, factor=factor)
         courses = []
-        for move in self.moves:
+        for move in MOVES:
             outputs, state = self.stepped(self.rest, rungs[0], self.pulsed(i, factor * move))
             course = [outputs]
             while len(course) < len(rungs) and self._is_followed(course[-1], self.largest):
@@ -257,89 +230,56 @@ class Excitation:
         return self._response(courses, factor)
 
     def _response(self, courses: Sequence[Floats], factor: float) -> Floats:
-        apart = self.apart([course[: min(map(len, courses))] for course in courses])
-        return np.asarray(apart / self.weight / (2.0 * factor * self.pulse))
+        up, down = (course[: min(map(len, courses))] for course in courses)
+        return np.asarray((up - down) / self.weight / (2.0 * factor * self.pulse))
 
     def _is_followed(self, outputs: Floats, largest: float) -> bool:
         return bool(np.abs((outputs - self.at_rest) / self.weight).max(initial=0.0) <= largest)
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
-        courses = [self._course(self.rest, [(self.held + move * x, rung) for x in moves]) for move in self.moves]
-        return np.asarray(0.5 * self.apart(courses))
+        up, down = (self._course(self.rest, [(self.held + move * x, rung) for x in moves]) for move in MOVES)
+        return np.asarray(0.5 * (up - down))
 
     # -- coarse rounding -------------------------------------------------------------------------------------------
 
-    def rounds_coarsely(self, rungs: Sequence[Rung]) -> bool:
-        """Whether responses to the chosen pulses differ by their sizes, more than a linear model may.
-
-        Or those to smaller ones, which are better if not for rounding. Raises `ImpreciseError` where these differ by
-        more than single precision rounds.
-        """
-        chosen = self.pulse
+    def expect_fine(self, rungs: Sequence[Rung]) -> None:
+        """Raise `ImpreciseError` for an instance that rounds more coarsely than double precision does."""
+        chosen, largest = self.pulse, self.largest
         try:
-            if self._differs(rungs, 0.0):
-                self._differs(rungs, COARSER, PULSE)  # which may raise
-                return True
-            return chosen > PULSE and self._differs(rungs, COARSER, PULSE)
+            self._expect_small_ones_followed(rungs)
+            self.pulse, self.largest = chosen, largest
+            for self.pulse, least in ((chosen, 0.0), (PULSE, COARSER)) if chosen > PULSE else ((chosen, 0.0),):
+                self._expect_alike(rungs, least)
         finally:
-            self.pulse = chosen
+            self.pulse, self.largest = chosen, largest
 
-    def _differs(self, rungs: Sequence[Rung], least: float, pulse: float | None = None) -> bool:
-        self.pulse, found = pulse or self.pulse, False
+    def _expect_alike(self, rungs: Sequence[Rung], least: float) -> None:
+        """Responses to pulses of several sizes may not differ by more than a linear model may, and by `least`."""
         for i in range(len(self.inputs)):
             courses = [self.response(i, rungs, factor=factor) for factor in DITHER]
             each = np.array([course[: min(map(len, courses))] for course in courses])
             apart = float(np.ptp(each, axis=0).max(initial=0.0))
-            if self.pulse == PULSE and apart * PULSE > QUANTISED:
-                raise ImpreciseError(
-                    f"{self.name}: its outputs jump as {self.inputs[i]} changes by {PULSE:g}, by more than single "
-                    "precision rounds, as of code that quantises: what small deviations do cannot be told"
-                )
-            found |= apart > max(COARSE * float(np.abs(each).max(initial=0.0)), least / self.pulse)
-        return found
+            if apart > max(COARSE * float(np.abs(each).max(initial=0.0)), least / self.pulse):
+                raise self._imprecise(f"has outputs that jump as {self.inputs[i]} changes by {self.pulse:.2g}")
 
-    def use_large_pulses(self, rungs: Sequence[Rung]) -> None:
-        """Take large pulses of several sizes: of each input the largest up to which responses agree."""
-        self.sizes, self.parts, self.largest, self.pulse = SIZES, LINEAR_PART, np.inf, LARGE_PULSE
-        found = [self.response(i, rungs) for i in range(len(self.inputs))]
-        usual = np.max([np.abs(one).max(axis=0) for one in found], axis=0, initial=0.0)
-        usual, scale = np.where(usual > 0.0, usual, 1.0), self.scale.copy()
-        for i in range(len(self.inputs)):
-            found = []
-            for factor in LARGE_FACTORS:
-                self.scale = scale * factor
-                found.append(self.response(i, rungs) / factor / usual)
-            apart = np.array([np.abs(one - other).max(initial=0.0) for one, other in pairwise(found)])
-            alike = np.flatnonzero(apart <= LEAST * np.nanmin(apart, initial=np.inf))
-            scale[i] *= LARGE_FACTORS[int(alike[-1]) if len(alike) else 0]
-        self.scale = scale
+    def _imprecise(self, what: str) -> ImpreciseError:
+        return ImpreciseError(
+            f"{self.name} {what}, as code in single precision, or that quantises or has a dead zone: what small "
+            "deviations do cannot be told: expected an FMU in double precision, or its C through quadcosim wrap"
+        )
 
-    def drowns(self, rungs: Sequence[Rung]) -> bool:
-        """Whether outputs follow large deviations of an input, but small ones not at all, as in single precision.
-
-        Raises `ImpreciseError` for an input of which they do not follow what single precision resolves.
-        """
+    def _expect_small_ones_followed(self, rungs: Sequence[Rung]) -> None:
+        """Outputs that follow large deviations of an input have to follow small ones, too."""
         small = [self.response(i, rungs) for i in range(len(self.inputs))]
         usual = np.max([np.abs(one).max(axis=0, initial=0.0) for one in small], axis=0, initial=0.0)
-        chosen, found = (self.pulse, self.largest), False
-        self.largest = np.inf
+        chosen, self.largest = self.pulse, np.inf
         for i in (i for i, one in enumerate(small) if not one.any()):
-            before = chosen[0]
-            for self.pulse in (pulse for pulse in LARGER if pulse > before):
+            for self.pulse in (pulse for pulse in LARGER if pulse > chosen):
                 follows = np.abs(self.response(i, rungs)).max(axis=0, initial=0.0)
                 if (follows > FOLLOWS * usual).any():
-                    if float(follows.max()) * before > STANDS_OUT * SINGLE:
-                        raise ImpreciseError(
-                            f"{self.name} follows a change of {self.inputs[i]} by {self.pulse:g}, but not by "
-                            f"{before:g}, as code that quantises, or with a dead zone: what small deviations do cannot "
-                            "be told"
-                        )
-                    found = True
-                    break
-                before = self.pulse
-        self.pulse, self.largest = chosen
-        return found
+                    what = f"follows a change of {self.inputs[i]} by {self.pulse:g}, but not by {chosen:g}"
+                    raise self._imprecise(what)
 
     # -- how far it is linear -------------------------------------------------------------------------------------
 

@@ -21,6 +21,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.delay_margin import Late, delay_margin, jumps_of
+from orchestration.theory.stability.in_double import of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.linearise import (
@@ -29,7 +30,6 @@ from orchestration.theory.stability.linearise import (
     clock_of,
     cut_open,
     in_isolation,
-    known_to,
     rest_of_loop,
     sampled_component,
     stability_of,
@@ -113,8 +113,8 @@ class Bode:
     """Frequencies up to half the sampling rate [rad/s], shape (n,)."""
     gains: Complexes = field(repr=False)
     """Loop gains L at them, which negative feedback closes, shape (loops, n)."""
-    precision: float = 0.0
-    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
+    in_double: tuple[str, ...] = ()
+    """The components whose float code in C is taken in double precision."""
 
     def __repr__(self) -> str:
         return f"<Bode: {self.verdict}>"
@@ -124,7 +124,7 @@ class Bode:
         """The smallest margins of a loop, or that it is unstable and has none."""
         clock = clock_of(self.dt, self.samples)
         if not self.stable:
-            return f"{stability_of(self.radius, self.precision)}, {clock}: an unstable loop has no margins"
+            return f"{stability_of(self.radius)}, {clock}: an unstable loop has no margins"
         factors = [one.factor for loop in self.loops for one in loop.gain_margins]
         below, above = [x for x in factors if x < 1.0], [x for x in factors if x > 1.0]
         gains = [f"{one:.3g}" for one in (max(below, default=None), min(above, default=None)) if one is not None]
@@ -139,7 +139,7 @@ class Bode:
             if delays
             else "infinite delay margin",
         ]
-        return f"stable, {clock}: {', '.join(margins)} (small deviations{known_to(self.precision)})"
+        return f"stable, {clock}: {', '.join(margins)} (small deviations{of_code(self.in_double)})"
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
@@ -187,7 +187,7 @@ def stepped_couplings(system: System) -> list[tuple[str, str, float]]:
 def expect_decided(loop: Linearised) -> None:
     """Raise `UsageError` for a loop whose stability rounding may decide, or whose halves are not the whole of it."""
     whole, by_halves = loop.radius, radius(loop)
-    if abs(whole - 1.0) < max(NEAR_ONE, loop.precision):
+    if abs(whole - 1.0) < NEAR_ONE:
         raise UsageError(f"the loop is neither stable nor unstable: its spectral radius is {whole:.9g}, which is 1")
     later = np.tri(loop.samples, k=-1, dtype=bool)  # what is measured follows from commands of earlier samples
     follows = np.kron(later, np.ones(np.array(loop.rest.D.shape) // loop.samples, dtype=bool))
@@ -225,7 +225,7 @@ def _bode(request: Request, component: str | None) -> Bode:
     return Bode(
         dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=tuple(found),
         outputs=tuple(_output(loop, i) for i in _commands(loop)), frequencies=frequencies, gains=gains,
-        precision=loop.precision,
+        in_double=loop.in_double,
         sensitivity_peak=max((each.sensitivity_peak for each in found), default=None),
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.stability.excitation import COARSE, Excitation, ImpreciseError, Rest, Rung
+from orchestration.theory.stability.excitation import COARSE, Excitation, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import Tangent
 
@@ -30,8 +30,6 @@ FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""
 SHRUNK = (1.0, 0.3, 0.1)
 """Factors on the pulses, tried in turn"""
-ROUGH = 1e-4
-"""Precision of a component that rounds coarsely, with which smaller pulses are not tried"""
 FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
@@ -87,11 +85,9 @@ def of_samples(rest: Rest, period: float) -> SampledRest:
 
 
 def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung]) -> int:
-    """Choose the pulses, large ones for a component that rounds coarsely; the rungs over which it is linear."""
+    """Choose the pulse; the rungs over which it is linear. Raises `ImpreciseError` for what rounds coarsely."""
     count = excitation.choose_pulse(rungs)
-    if excitation.drowns(rungs[:FEW]) or excitation.rounds_coarsely(rungs[:FEW]):
-        excitation.use_large_pulses(rungs[:FEW])
-        count = len(rungs)
+    excitation.expect_fine(rungs[:FEW])
     return count
 
 
@@ -101,7 +97,6 @@ def _tangent(excitation: Excitation, sample: Rung, count: int, samples: int = 1)
 
     def proved(excitation: Excitation) -> Tangent:
         tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
-        tangent.fit(sample.h, 8.0 * len(ladder) * sample.h)
         tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
         return tangent
 
@@ -111,20 +106,14 @@ def _tangent(excitation: Excitation, sample: Rung, count: int, samples: int = 1)
         smaller.pulse = factor * excitation.pulse
         try:
             found.append(proved(smaller))
-            if max(found[-1].accuracy, found[-1].precision) <= (ROUGH if excitation.is_coarse else COARSE):
+            if found[-1].accuracy <= COARSE:
                 break
         except UsageError as error:
             refused.append(error)
     if not found:
-        raise (ImpreciseError if excitation.is_coarse else UsageError)(str(refused[0]))
-    best = min(found, key=lambda one: max(one.accuracy, one.precision))
-    try:
-        best.prove_held(sample.h, samples)
-    except UsageError:
-        if excitation.is_coarse:
-            raise
-        excitation.use_large_pulses([sample] * FEW)
-        return _tangent(excitation, sample, count, samples)
+        raise refused[0]
+    best = min(found, key=lambda one: one.accuracy)
+    best.prove_held(sample.h, samples)
     return best
 
 

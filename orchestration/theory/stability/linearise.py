@@ -22,6 +22,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.theory.stability.in_double import of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.lifted_component import lifted_names
 from orchestration.theory.stability.linear_simulator import OpenPort
@@ -61,8 +62,8 @@ class Linearised:
     deviations decay."""
     poles: tuple[Pole, ...]
     """The poles of the whole loop, as `radius`, the slowest first, without those at 0."""
-    precision: float = 0.0
-    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
+    in_double: tuple[str, ...] = ()
+    """The components whose float code in C is taken in double precision."""
 
     def __repr__(self) -> str:
         return f"<Linearised: {self.verdict}>"
@@ -71,7 +72,7 @@ class Linearised:
     def verdict(self) -> str:
         """Whether the linear loop is stable, and its sizes."""
         sizes = f"{self.name} with {_count_of(len(self.component.A))}, the rest with {_count_of(len(self.rest.A))}"
-        return f"{stability_of(self.radius, self.precision)}, {self.clock}: {sizes}{known_to(self.precision)}"
+        return f"{stability_of(self.radius)}, {self.clock}: {sizes}{of_code(self.in_double)}"
 
     @property
     def dt(self) -> float:
@@ -146,7 +147,7 @@ def cut_open(loop: AtRest, name: str) -> Linearised:
         samples=samples,
         radius=float(np.abs(np.linalg.eigvals(whole)).max(initial=0.0)),
         poles=as_poles(poles_of(whole), rest.dt),
-        precision=loop.precision,
+        in_double=loop.in_double,
     )
 
 
@@ -176,16 +177,12 @@ def clock_of(dt: float, samples: int) -> str:
     return often if samples == 1 else f"{often}, in a period of all rates of {quantity(samples * dt, 's')}"
 
 
-def known_to(precision: float) -> str:
-    """How well a loop is known of which components round coarsely, in words; nothing of others."""
-    return f", known to {precision:.0g}, as code in single precision" if precision else ""
-
-
-def stability_of(radius: float, precision: float = 0.0) -> str:
+def stability_of(radius: float) -> str:
     """Whether a loop with a spectral radius is stable, in words."""
-    if math.isclose(radius, 1.0, abs_tol=max(NEAR_ONE, precision)):
+    if math.isclose(radius, 1.0, abs_tol=NEAR_ONE):
         return f"not decidably stable: spectral radius {radius:.9g}"
-    return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {radius:.4g}"
+    shown = f"{radius:.4g}" if abs(radius - 1.0) > 1e-3 else f"{radius:.9g}"
+    return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {shown}"
 
 
 def _count_of(count: int) -> str:

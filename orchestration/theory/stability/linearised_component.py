@@ -17,46 +17,36 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.excitation import (
+    MOVES,
     ROUNDING,
-    SINGLE,
     STANDS_OUT,
     Errors,
     Excitation,
-    ImpreciseError,
     Rest,
     Rung,
     SavedState,
     States,
 )
-from orchestration.theory.stability.fitted_model import LinearModel, fitted, responses_needed
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 
 SCALINGS = 4
 """Rounds in which rows and columns are scaled to errors of one size"""
 UNPROVEN = 1e-5
 """Error of a predicted response, relative to the largest of that output, from which a linear model is refused"""
-IMPRECISE = 1e-3
-"""Error of a predicted response of a component that rounds coarsely, from which its model is refused"""
 PROOF_STEPS = 256
 """Steps of the random input, at most"""
 HELD_STEPS = 1024
 """Samples over which inputs are held to see slow states, at most"""
 UNSEEN = 1e-4
 """Error of the response to a held input, relative to it at the end, from which slow states are taken to be missed"""
-ROUGHLY = 0.02
-"""The same of a component that rounds coarsely, from which its model is refused"""
 SMALL = 0.01
 """Share of the largest response, below which one at the end counts as that much"""
-EXCITED = 0.75
-"""Share of the steps of a response that is fitted, after which the inputs are at rest"""
 LINEAR = 1e-6
 """Error allowed of what is predicted at another point of rest or from an initial state, relative to the largest"""
 
 
 ROUNDED = 4.0 * float(np.finfo(float).eps)
 """Error of rounding of a derivative, relative, per condition number of the coordinates"""
-SIMILAR = 10.0
-"""Factor on the accuracy of a component that rounds coarsely, up to which it holds at another point of rest"""
 
 
 class Tangent(LinearSimulator):
@@ -80,7 +70,7 @@ class Tangent(LinearSimulator):
         self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
         self._fewest, self._most = fewest, most
         self._known: dict[int, tuple[Floats, Floats]] = {}
-        self.accuracy = self._spread = 0.0
+        self.accuracy = 0.0
         self._find_coordinates(excitation.errors_over(ladder), fewest)
         self.state = np.zeros(len(self._inverse))
 
@@ -88,11 +78,6 @@ class Tangent(LinearSimulator):
     def pulse(self) -> float:
         """The pulse by which it was measured, relative."""
         return self._excitation.pulse
-
-    @property
-    def precision(self) -> float:
-        """The accuracy, relative, of a component that rounds coarsely, at any frequency; 0 of others."""
-        return max(self.accuracy, self._spread) if self._excitation.is_coarse else 0.0
 
     @property
     def rounding(self) -> float:
@@ -114,9 +99,7 @@ class Tangent(LinearSimulator):
             by_state = [self._difference([excitation.followed(s, rung) for s in states]) for states in self._produced]
             sizes = excitation.pulses / excitation.pulse
             by_input = [
-                self._difference(
-                    [excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in excitation.moves]
-                )
+                self._difference([excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in MOVES])
                 / sizes[i]
                 for i in range(len(self.inputs))
             ]
@@ -152,32 +135,14 @@ class Tangent(LinearSimulator):
             again._prove(excitation)
         except UsageError:
             return None
-        return again if again.accuracy <= max(LINEAR, SIMILAR * self.precision) else None
+        return again if again.accuracy <= LINEAR else None
 
     def with_pulse(self, factor: float) -> "Tangent":
         """The same with pulses times a factor, at no more states: what rounding adds to them is none."""
         excitation = copy(self._excitation)
         excitation.pulse *= factor
         again = Tangent(excitation, self.ladder, self._fewest, unit=self.unit, most=len(self.state))
-        again.fit(*self._proof)
         return again
-
-    def fit(self, h: float, duration: float) -> None:
-        """Fit it to responses to random inputs, in steps of `h` over a `duration` [s], where it rounds coarsely."""
-        if not self._excitation.is_coarse:
-            return
-        excitation, rng, rung = self._excitation, np.random.default_rng(1), self._rung(h)
-        model = LinearModel(matrix=np.hstack(self.derivatives(h)), states=len(self.state))
-        steps, states = _steps(h, duration), len(self.state)
-        count = responses_needed(model, steps)
-        if not count:
-            return
-        offsets, changes = (rng.uniform(-0.5, 0.5, (count, n, len(self.inputs))) for n in (1, steps))
-        moves = (offsets + changes) * excitation.pulses
-        moves[:, round(EXCITED * steps) :] = 0.0
-        found = fitted(model, moves, np.array([excitation.response_to(each, rung) for each in moves]))
-        self._known[round(h * NANOSECONDS)] = found.model.matrix[:, :states], found.model.matrix[:, states:]
-        self._spread = found.spread(excitation.pulses)
 
     def prove(self, h: float, duration: float) -> None:
         """Compare its response to a random input, in steps of `h` over a `duration` [s], with that of the component.
@@ -201,19 +166,13 @@ class Tangent(LinearSimulator):
             predicted[k], state = after[:cut], after[cut:]
         largest = np.abs(measured).max(axis=0, initial=0.0)
         error = np.abs(measured - predicted).max(axis=0, initial=0.0)
-        if excitation.is_coarse:
-            error[largest <= STANDS_OUT * SINGLE * excitation.weight] = 0.0
-        else:
-            error = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
+        error = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
         self.accuracy = float((error / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
-        allowed = IMPRECISE if excitation.is_coarse else UNPROVEN
-        if not self.accuracy <= allowed:
-            kind = ImpreciseError if excitation.is_coarse else UsageError
-            cause = ", as its outputs are rounded, as in single precision" if excitation.is_coarse else ""
-            raise kind(
+        if not self.accuracy <= UNPROVEN:
+            raise UsageError(
                 f"{excitation.name}: its linear model, of {len(state)} states, does not predict the response to a "
                 f"random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, expected at most "
-                f"{allowed:g}{cause}"
+                f"{UNPROVEN:g}"
             )
 
     def prove_held(self, h: float, samples: int = 1) -> None:
@@ -222,12 +181,11 @@ class Tangent(LinearSimulator):
         Of several `samples` in a step each input is held at all of them.
 
         They show slow states, as of an integral, that rounding hides from short responses. Raises `UsageError` where
-        they differ; `accuracy` of a component that rounds coarsely covers the difference.
+        they differ.
         """
         excitation, rung, cut = self._excitation, self._rung(h), len(self.outputs)
         by_state, by_input = self.derivatives(h)
-        holds = bool((np.abs(np.linalg.eigvals(by_state[cut:]) - 1.0) < 1.0 / HELD_STEPS).any())
-        first, rounding = 2 * len(self.ladder), SINGLE if excitation.is_coarse else ROUNDING
+        first = 2 * len(self.ladder)
         steps, several = max(2 * first, HELD_STEPS // samples), len(self.inputs) // samples
         for i, name in enumerate(self.inputs[:several]):
             move = np.zeros(len(self.inputs))
@@ -242,21 +200,14 @@ class Tangent(LinearSimulator):
             measured = excitation.response_to(np.tile(move, (count, 1)), rung)
             late = slice(count // 2, None)
             size = np.maximum(np.abs(measured[late]).max(axis=0), SMALL * np.abs(measured).max(axis=0))
-            error = np.abs(measured - predicted[:count])[late].max(axis=0) - STANDS_OUT * rounding * excitation.weight
+            error = np.abs(measured - predicted[:count])[late].max(axis=0) - STANDS_OUT * ROUNDING * excitation.weight
             found = float((np.maximum(error, 0.0) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
-            allowed = ROUGHLY if excitation.is_coarse else UNSEEN
-            if excitation.is_coarse and not holds:  # what still moves at the end is then a state that is missed
-                sooner, later = np.array_split((measured - predicted[:count])[late], 2)
-                drift = np.abs(later.mean(axis=0) - sooner.mean(axis=0)) / np.where(size > 0.0, size, 1.0)
-                allowed = UNSEEN if drift.max(initial=0.0) > UNSEEN else ROUGHLY
-            if not found <= allowed:
-                raise (ImpreciseError if excitation.is_coarse else UsageError)(
+            if not found <= UNSEEN:
+                raise UsageError(
                     f"{excitation.name}: its linear model, of {len(self.state)} states, does not predict the response "
-                    f"to {name} held over {count * h:.3g} s: off by {found:.1g} of it, expected at most {allowed:g}, "
+                    f"to {name} held over {count * h:.3g} s: off by {found:.1g} of it, expected at most {UNSEEN:g}, "
                     "as where rounding hides a slow integral"
                 )
-            if excitation.is_coarse:
-                self.accuracy = max(self.accuracy, found)
 
     # -- coordinates --------------------------------------------------------------------------------------------
 
@@ -273,7 +224,7 @@ class Tangent(LinearSimulator):
             ranks.append(0 if found is None else len(found[1]))
             if len(ranks) >= fewest and len(set(ranks[-3:])) == 1:
                 break
-            latest = [tuple(excitation.followed(one, rung)[1] for one in states) for states in latest]
+            latest = [(excitation.followed(a, rung)[1], excitation.followed(b, rung)[1]) for a, b in latest]
         if found is None or not len(found[1]):
             self._axes = self._back = np.zeros((len(ladder) * len(self.outputs), 0))
             self._produced, self._inverse = [], np.zeros((0, 0))
@@ -310,9 +261,9 @@ class Tangent(LinearSimulator):
 
     def _difference(self, followed: Sequence[tuple[Floats, SavedState]]) -> Floats:
         """Outputs and coordinates after a step, per unit of the pulse up and down."""
-        outputs, states = zip(*followed, strict=True)
-        future = self._axes.T @ self._excitation.futures(states, self.ladder)
-        return np.asarray(np.concatenate([self._excitation.apart(outputs) / (2.0 * self.pulse), future]))
+        (up, after_up), (down, after_down) = followed
+        future = self._axes.T @ self._excitation.futures((after_up, after_down), self.ladder)
+        return np.asarray(np.concatenate([(up - down) / (2.0 * self.pulse), future]))
 
     def _rung(self, h: float) -> Rung:
         return Rung(1, h) if self.unit is None else Rung(round(h / self.unit), self.unit)

@@ -15,9 +15,9 @@ from orchestration.foundation.basics.unit_algebra import some
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.excitation import ImpreciseError
+from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
-from orchestration.theory.stability.linearise import known_to
-from orchestration.theory.stability.loop_at_rest import KnownTangents, precision_of
+from orchestration.theory.stability.loop_at_rest import KnownTangents
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
     NotAnEquilibriumError,
@@ -107,13 +107,14 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
 
     rates = _commensurate(at, span)
     found = _first_growth(growth, span, LOOP_TOLERANCE, LOOP) if rates is None else _first_tried(growth, span, rates)
+    code = of_code(are_in_double({name: one for name, (one, _, _) in known.items()}))
+    found = replace(found, method=f"{LOOP}{code}")
     if found.limit is None or found.accuracy is None:
         return found
     below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
     slope = (growths[above] - growths[below]) / (above - below)
     difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE, known) - growths[below])
-    precise = known_to(precision_of(one for _, _, one in known.values()))
-    return replace(found, method=f"{LOOP}{precise}", accuracy=found.accuracy + difference / slope)
+    return replace(found, accuracy=found.accuracy + difference / slope)
 
 
 def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:

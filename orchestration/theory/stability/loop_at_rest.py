@@ -1,7 +1,7 @@
 """A system at rest at its operating point, and its components about it, each as a `Tangent`."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance, Loader
-from orchestration.components.fmi.read_description import Model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
@@ -30,6 +30,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import expect_fixed_periods
 from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.identification import FINEST, SampledRest, in_continuous_time, of_samples
+from orchestration.theory.stability.in_double import are_in_double, expect_same_law
 from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.operating_point import (
@@ -89,9 +90,9 @@ class AtRest:
         return {name: self.tangent(name) for name in self.simulation.instances}
 
     @property
-    def precision(self) -> float:
-        """The error of its components that round coarsely, relative; 0: there are none."""
-        return precision_of(self.tangents.values())
+    def in_double(self) -> tuple[str, ...]:
+        """Its components whose float code is in double precision."""
+        return are_in_double(self.simulation.system.components)
 
     def tangent(self, name: str) -> AnyTangent:
         """A component about rest."""
@@ -209,11 +210,15 @@ def _settled(
     """A system that has come to rest over some periods."""
     begin = begin_of(calm, period)
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
-    resolved = None if models is None else resolve_with_models(calm, models)
+    doubled = {name: read_model(calm.components[name].fmu) for name in are_in_double(calm.components)}
+    resolved = None if models is None else resolve_with_models(calm, {**models, **doubled})
     with prepared(calm, load=tracing_loader(instances), resolved=resolved) as simulation:
         _expect_states(simulation)
         _expect_open_instants(simulation)
-        _settle(simulation, begin, period)
+        try:
+            _settle(simulation, begin, period)
+        finally:  # also where it does not rest, as another law need not
+            expect_same_law(calm, instances, written_in(simulation))
         yield AtRest(
             simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
             extra=extra, period=period, known=known,
@@ -229,10 +234,9 @@ def begin_of(calm: System, period: Fraction) -> Fraction:
     return latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
 
 
-def precision_of(tangents: Iterable[AnyTangent]) -> float:
-    """The largest error of those that round coarsely, relative; 0: there are none."""
-    wholes = (one.whole if isinstance(one, LiftedTangent) else one for one in tangents)
-    return max((one.precision for one in wholes), default=0.0)
+def written_in(simulation: PreparedRun) -> dict[str, dict[str, float]]:
+    """The inputs last written in a run of instances that trace them, by component."""
+    return {name: cast("TracedInstance", one).written for name, one in simulation.instances.items()}
 
 
 def samples_of(found: AnyTangent | SampledRest) -> int:
@@ -344,6 +348,12 @@ class TracedInstance:
             self.written.update(zip(names, source.tolist()))
 
         return transfer
+
+    @contextmanager
+    def beside(self, instance_name: str, access: Access) -> Iterator["TracedInstance"]:
+        """As `Instance`."""
+        with self.fmu.beside(instance_name, access) as other:
+            yield TracedInstance(other)
 
     def enter_initialization(self, start: float, stop: float) -> None:
         """As `Simulator`, without an end: other runs begin where this one has come to rest."""

@@ -1,4 +1,4 @@
-"""A system at its operating point, without randomness and quantisation, and whether it rests there."""
+"""A system at its operating point, without randomness, quantisation and floats of C, and whether it rests there."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,6 +15,7 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import punctual
+from orchestration.theory.stability.in_double import in_double
 
 AT_REST = 1e-6
 """change allowed in the first periods of the unperturbed run"""
@@ -27,8 +28,11 @@ class NotAnEquilibriumError(UsageError):
 
 
 def deterministic(system: System) -> System:
-    """`system` at its operating point, without jitter, loss, noise, quantisation and objectives."""
-    chosen = changed(system, system.operating_point)
+    """`system` at its operating point, without jitter, loss, noise, quantisation and objectives.
+
+    Float code in C is in double precision. Raises `UsageError` as `in_double`.
+    """
+    chosen = in_double(changed(system, system.operating_point))
     return replace(
         chosen,
         components={name: _punctual(component) for name, component in chosen.components.items()},

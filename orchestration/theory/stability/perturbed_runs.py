@@ -8,7 +8,7 @@ every period of the loop; that law is fitted to the exchanged signals, by the si
 
 import math
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -20,12 +20,13 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
-from orchestration.simulation.runs.prepared import prepared
+from orchestration.simulation.runs.prepared import PreparedRun, prepared
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import operating_point
 from orchestration.theory.stability.excitation import PULSE
-from orchestration.theory.stability.loop_at_rest import wrapping_loader
+from orchestration.theory.stability.in_double import expect_same_law
+from orchestration.theory.stability.loop_at_rest import tracing_loader, wrapping_loader, written_in
 
 LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
@@ -61,10 +62,11 @@ def growth_of(system: System, instances: Instances, factor: float = 1.0) -> Grow
     horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST_INSTANTS * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
     interval = period * max(1, math.floor(horizon / period / MOST_INSTANTS))
-    unperturbed, perturbed = (
-        _exchanged_rows(nominal, load, interval)
-        for load in (instances.load, wrapping_loader(instances, lambda fmu: Pulsed(fmu, factor)))
+    unperturbed = _exchanged_rows(
+        nominal, tracing_loader(instances), interval, lambda run: expect_same_law(nominal, instances, written_in(run))
     )
+    pulsing = wrapping_loader(instances, lambda fmu: Pulsed(fmu, factor))
+    perturbed = _exchanged_rows(nominal, pulsing, interval, lambda run: None)
     operating_point.expect_rest(nominal, unperturbed[1:6])
     count = min(len(unperturbed), len(perturbed))
     scale = np.maximum(1.0, np.abs(unperturbed[0]))
@@ -114,12 +116,15 @@ def _between(size: Floats, begin: int, end: int) -> float:
     return math.log(float(size[end] / size[begin])) / (end - begin)
 
 
-def _exchanged_rows(system: System, load: Loader, interval: Fraction) -> Floats:
+def _exchanged_rows(
+    system: System, load: Loader, interval: Fraction, afterwards: Callable[[PreparedRun], None]
+) -> Floats:
     """The exchanged signals at each compared instant, shape (n, signals)."""
     with prepared(system, load=load) as simulation:
         simulation.master.initialise()
         simulation.master.run()
         result = simulation.result()
+        afterwards(simulation)
     times = np.round(result.rows[:, 0] * NANOSECONDS).astype(np.int64)
     count = math.floor(Fraction(int(times[-1])) / interval)  # at the stop itself nothing samples
     instants = [math.floor(operating_point.latest_offset(system) + k * interval) + 1 for k in range(count)]

@@ -26,9 +26,9 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart_of
+from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.linearise import known_to
-from orchestration.theory.stability.loop_at_rest import KnownTangents, precision_of, whole_at_rest
+from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
     beside_others,
@@ -91,8 +91,8 @@ class RootLocus:
     """Values at which poles cross the unit circle, in rising order."""
     curve: Floats = field(repr=False)
     """All values that were tried, also beside jumps, and the spectral radius at each, shape (2, k)."""
-    precision: float = 0.0
-    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
+    in_double: tuple[str, ...] = ()
+    """The components whose float code in C is taken in double precision."""
 
     @property
     def verdict(self) -> str:
@@ -102,7 +102,7 @@ class RootLocus:
             return quantity(value, self.unit, DIGITS)
 
         first, last = shown(self.values[0]), shown(self.values[-1])
-        known = f"(small deviations{known_to(self.precision)})"
+        known = f"(small deviations{of_code(self.in_double)})"
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
@@ -213,7 +213,7 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
     return RootLocus(
         of=varied.of, unit=unit, values=np.array(values), radius=np.array([radius_of(value) for value in values]),
         poles=poles, crossings=tuple(crossings), curve=curve,
-        precision=precision_of(one for _, _, one in known.values()),
+        in_double=are_in_double({name: one for name, (one, _, _) in known.items()}),
     )  # fmt: skip
 
 

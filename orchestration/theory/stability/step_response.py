@@ -12,7 +12,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.theory.stability.frequency import expect_decided, receivers_of
-from orchestration.theory.stability.linearise import Linearised, clock_of, known_to, linearise
+from orchestration.theory.stability.in_double import of_code
+from orchestration.theory.stability.linearise import Linearised, clock_of, linearise
 from orchestration.theory.stability.loop_halves import ClosedLoop, closed
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ class Step:
     """Times of the samples [s], shape (n,)."""
     responses: Floats = field(repr=False)
     """Share of each step that the law takes back, shape (loops, n)."""
-    precision: float = 0.0
-    """The error, relative, of components that round coarsely, as in single precision; 0: none does."""
+    in_double: tuple[str, ...] = ()
+    """The components whose float code in C is taken in double precision."""
 
     @property
     def verdict(self) -> str:
@@ -72,7 +73,7 @@ class Step:
         settled = f"settles in {quantity(slowest.settling_time, 's')}"
         return (
             f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
-            f"{clock_of(self.dt, self.samples)} (small deviations{known_to(self.precision)})"
+            f"{clock_of(self.dt, self.samples)} (small deviations{of_code(self.in_double)})"
         )
 
     @property
@@ -116,7 +117,7 @@ def step(request: RequestLike, component: str | None = None) -> Step:
     found = (_figures(loop, request, i, times, responses[i], float(final[i])) for i in range(count))
     return Step(
         dt=loop.dt, samples=loop.samples, loops=tuple(found), times=times, responses=responses,
-        precision=loop.precision,
+        in_double=loop.in_double,
     )  # fmt: skip
 
 

@@ -72,7 +72,7 @@ def test_a_limit_states_the_last_good_value_the_first_bad_one_and_its_resolution
 
 
 def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() -> None:
-    half, common = SimpleNamespace(A=[0.0], dt=0.01), {"precision": 0.0, "clock": "sampled every 10 ms"}
+    half, common = SimpleNamespace(A=[0.0], dt=0.01), {"in_double": (), "clock": "sampled every 10 ms"}
 
     def sentence(radius: float) -> str:
         loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius, **common)
