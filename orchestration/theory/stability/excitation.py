@@ -138,11 +138,6 @@ class Excitation:
             return False
         return bool((np.abs(self.held - other.held) <= AT_REST * self.scale).all())
 
-    def measure_as(self, other: "Excitation") -> None:
-        """Take the pulses of another excitation, of one or several samples of it."""
-        samples = len(self.inputs) // len(other.inputs) if other.inputs else 1
-        self.pulse, self.largest, self.scale = other.pulse, other.largest, np.tile(other.scale, samples)
-
     @property
     def pulses(self) -> Floats:
         """The pulse of each input."""

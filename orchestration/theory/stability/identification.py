@@ -69,7 +69,7 @@ class SampledRest:
         rest.fmu.restore(excitation.rest.saved)
         fmu = LiftedInstance(rest, samples)
         lifted = Excitation(lifted_rest(rest, fmu, samples))
-        lifted.measure_as(excitation)
+        lifted.pulse = excitation.pulse
         return LiftedTangent(_tangent(lifted, Rung(1, samples * self.period), count, samples), rest, fmu, samples)
 
 

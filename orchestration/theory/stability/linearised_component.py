@@ -97,10 +97,9 @@ class Tangent(LinearSimulator):
         if key not in self._known:
             excitation, rung = self._excitation, self._rung(h)
             by_state = [self._difference([excitation.followed(s, rung) for s in states]) for states in self._produced]
-            sizes = excitation.pulses / excitation.pulse
             by_input = [
                 self._difference([excitation.stepped(excitation.rest, rung, excitation.pulsed(i, x)) for x in MOVES])
-                / sizes[i]
+                / excitation.scale[i]
                 for i in range(len(self.inputs))
             ]
             size = len(self.outputs) + len(self._inverse)
@@ -128,7 +127,7 @@ class Tangent(LinearSimulator):
         excitation = Excitation(rest)
         if not excitation.is_like(self._excitation):
             return None
-        excitation.measure_as(self._excitation)
+        excitation.pulse, excitation.scale = self._excitation.pulse, self._excitation.scale
         again = copy(self)
         again.state, again.input, again.output = (np.zeros_like(x) for x in (self.state, self.input, self.output))
         try:

@@ -94,7 +94,8 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
         found = _by_twins(at, span)
     except (UsageError, SimulatorError) as error:
         return LinearLimit(reason=f"no local limit: {error}")
-    return replace(found, method=f"{TWINS}, as saved states do not suffice: {why}")
+    code = of_code(are_in_double(deterministic(at(span.first)).components))
+    return replace(found, method=f"{TWINS}{code}, as saved states do not suffice: {why}")
 
 
 def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LinearLimit:
@@ -122,23 +123,18 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
 
     Rounding grows and decays as rounding does, whatever the limit: two pulses of about one size have to agree, too.
     """
-    for factor in (1.0, OTHER_SIZE):
-        with closing(Instances()) as instances:
-            found = _first_growth(partial(_rate, at, instances, factor), span, TWINS_TOLERANCE, TWINS)
-            if found.limit is None:
-                return found
-            near = _near(found.limit, span)
-            first, alike = (
-                [_rate(at, instances, size, value) for value in near] for size in (factor, DITHERED * factor)
-            )
-            if max(abs(a - b) for a, b in zip(first, alike)) > AGREE * abs(first[1] - first[0]):
-                continue
-            if all(
-                [_rate(at, instances, factor * OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
-                for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))
-                if end is not None
-            ):
-                return found if factor == 1.0 else replace(found, accuracy=NEAR * found.limit)
+    with closing(Instances()) as instances:
+        found = _first_growth(partial(_rate, at, instances, 1.0), span, TWINS_TOLERANCE, TWINS)
+        if found.limit is None:
+            return found
+        near = _near(found.limit, span)
+        first, alike = ([_rate(at, instances, size, value) for value in near] for size in (1.0, DITHERED))
+        if max(abs(a - b) for a, b in zip(first, alike)) <= AGREE * abs(first[1] - first[0]) and all(
+            [_rate(at, instances, OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
+            for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))
+            if end is not None
+        ):
+            return found
     return LinearLimit(
         reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
         "precision, or that switches"

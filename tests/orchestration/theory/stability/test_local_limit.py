@@ -34,7 +34,7 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     assert below.reason == "small deviations decay from 309.985 ms to 480 ms, where the scan ends"
 
 
-@pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, 0.5), (1e9, None)])
+@pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, None), (1e9, None)])
 def test_a_pulse_that_rounding_blurs_is_not_believed(
     monkeypatch: pytest.MonkeyPatch, enough: float, limit: float | None
 ) -> None:
