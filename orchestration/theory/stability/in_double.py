@@ -30,7 +30,7 @@ SAME = 2e-3
 """Difference of the responses, relative to the largest of an output, that single precision explains"""
 ROUNDED = 30.0 * float(np.finfo(np.float32).eps)
 """Error of an output by its rounding, relative to its size"""
-RESOLVED = 10.0
+RESOLVED = 1000.0
 """Times that error, from which a response is compared"""
 
 _OF: dict[str, str] = {}
