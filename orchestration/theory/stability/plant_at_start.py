@@ -18,7 +18,7 @@ from orchestration.simulation.runs.prepared import set_parameters
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.identification import in_continuous_time
-from orchestration.theory.stability.linearise import in_isolation, known_to
+from orchestration.theory.stability.linearise import in_isolation
 from orchestration.theory.stability.matrices import of_samples
 from orchestration.theory.stability.state_space import reduced
 
@@ -62,8 +62,6 @@ class PlantAtStart:
     """Rates of the states there that are not 0, by state."""
     dt: float | None = None
     """Time from sample to sample [s]; None: continuous time."""
-    precision: float = 0.0
-    """The error, relative, of an FMU that rounds coarsely, as in single precision; 0: it does not."""
 
     def __repr__(self) -> str:
         return f"<PlantAtStart: {self.verdict}>"
@@ -76,7 +74,7 @@ class PlantAtStart:
         moves = some(f"{name} by {rate:.4g} a second" for name, rate in self.rates.items())
         clock = "in continuous time" if self.dt is None else f"sampled every {quantity(self.dt, 's')}"
         rests = f"it does not rest there: {moves}" if moves else "it rests there"
-        return f"{self.name} about its start, {clock}: {sizes}; {rests}{known_to(self.precision)}"
+        return f"{self.name} about its start, {clock}: {sizes}; {rests}"
 
 
 def plant_at_start(request: RequestLike, period: float | None = None) -> PlantAtStart:
@@ -145,7 +143,6 @@ def _sampled(instance: Instance, period: float, step: float) -> PlantAtStart:
         name=model.name, A=A, B=B, C=C, D=np.zeros((count, len(inputs))),
         states=tuple(f"x{i}" for i in range(1, len(A) + 1)), inputs=rest.inputs, outputs=rest.outputs,
         operating_point=dict(zip((*inputs, *outputs), (*held.tolist(), *after.tolist()))), rates={}, dt=period,
-        precision=tangent.precision,
     )  # fmt: skip
 
 
