@@ -5,7 +5,7 @@ from pathlib import Path
 from setuptools import setup
 from setuptools.command.build_py import build_py
 
-FOLDERS, KEPT = ("examples", "studies", "gains"), (".csv", ".md", ".py", ".toml")
+FOLDERS, KEPT = ("examples", "studies", "gains"), (".c", ".csv", ".h", ".md", ".py", ".toml")
 """As in orchestration/components/scaffold/examples.py"""
 
 

@@ -95,6 +95,18 @@ def dc_servo() -> Figure:
     return figure
 
 
+def dc_motor() -> Figure:
+    """The speed with commands at once and late."""
+    figure = DOCS.figure(SMALL)
+    axes = figure.subplots()
+    for late, color, dashes in ((0.0, GREEN, "-"), (0.001, BLUE, "--"), (0.0013, ORANGE, "-.")):
+        result = simulate("dc_motor", stop_time=0.06, connections__command__delay=late)
+        line(axes, result, "motor.speed", color, f"{1e3 * late:g} ms late", linestyle=dashes)
+    axes.set(xlabel="time [s]", ylabel="speed [rad/s]", title="unstable from 1.355 ms on")
+    axes.legend(loc="lower right", ncols=3)
+    return figure
+
+
 def minimum_variance() -> Figure:
     """Cost over gain: theory, and eight runs at each of some gains."""
     figure = DOCS.figure(SMALL)
@@ -201,7 +213,7 @@ PERIOD = ("sampling.period", "parameters.period")
 FIGURES: dict[str, Callable[[], Figure]] = {
     draw.__name__: draw
     for draw in (
-        *(water_tank, double_integrator, dc_servo, distributed_servo, three_servos),
+        *(water_tank, double_integrator, dc_servo, dc_motor, distributed_servo, three_servos),
         *(minimum_variance, four_components, autopilot),
     )
 }

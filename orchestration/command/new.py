@@ -34,7 +34,7 @@ def new(
     if kind not in kinds:
         raise UsageError(f"new {kind}: expected {', '.join(kinds)}")
     if in_c and kind != "controller":
-        raise UsageError(f"new {kind} --c: expected controller")
+        raise UsageError(f"new {kind} --c: expected controller; a plant with its law in C is in examples/dc_motor")
     author = git_author() if author is None else author
     written = write(kinds[kind], name, out, author=author, license=license, in_c=in_c)
     if not author:

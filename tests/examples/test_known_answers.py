@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from examples.lqg import design as lqg
 from orchestration.experiments.limits import limit
@@ -19,6 +20,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.expect import expect, expected_of
 from orchestration.theory.exact.loops import Loops
+from quadcosim import bode, linearise
 from tests.examples.common import native_example as example
 from tests.extent import sample
 
@@ -70,6 +72,35 @@ def test_servo_decays_with_the_spectral_radius_of_theory() -> None:
     coefficients = np.linalg.lstsq(past / size[:, None], sampled[4:] / size, rcond=None)[0]
     radius = np.abs(np.roots([1.0, *-coefficients[::-1]])).max()
     assert radius == pytest.approx(0.9324, abs=5e-5)
+
+
+def motor_radius(period: float, late: float = 0.0) -> float:
+    """The spectral radius of the motor under its cascade over five samples, commands late by whole and part samples."""
+    motor = np.array([[-1e3, -50.0, 1e3], [500.0, -0.1, 0.0], [0.0, 0.0, 0.0]])
+    whole = math.floor(late / period)
+    before, after = (expm(motor * time)[:2] for time in (late - whole * period, (whole + 1) * period - late))
+    state = np.eye(6 + whole)  # current, speed, what the speed wants, two integrals, commands, the newest first
+    for k in range(5):
+        (current, speed, wanted, of_current, of_speed), sent = state[:5], state[5:]
+        if k == 0:
+            of_speed = of_speed - 20.0 * 1e-3 * speed
+            wanted = of_speed - 0.4 * speed
+        of_current = of_current + 1e3 * 2e-4 * (wanted - current)
+        sent = np.vstack([wanted - current + of_current, sent])
+        moved = before @ np.vstack([current, speed, sent[whole + 1]])
+        state = np.vstack([after @ np.vstack([moved, sent[whole]]), wanted, of_current, of_speed, sent[:-1]])
+    return float(np.abs(np.linalg.eigvals(state)).max())
+
+
+def test_motor_under_a_cascade_of_two_rates_has_the_margin_and_the_limit_of_its_matrices() -> None:
+    system = example("dc_motor")
+    (loop,) = bode(system).loops
+    assert loop.delay_margin == pytest.approx(1.3549e-3, abs=1e-6)
+    assert motor_radius(2e-4, loop.delay_margin - 1e-6) < 1.0 < motor_radius(2e-4, loop.delay_margin + 1e-6)
+    for period in (0.0002, 0.0025130005):
+        found = linearise(changed(system, {PERIOD: period})).radius
+        assert found == pytest.approx(motor_radius(period), abs=1e-5)
+    assert motor_radius(2.5136e-3) < 1.0 < motor_radius(2.5137e-3)
 
 
 @pytest.mark.parametrize(

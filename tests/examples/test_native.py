@@ -34,7 +34,9 @@ def on_native(name: str, mathematics: Mathematics) -> Result:
     asked = system(name)
     places = {Path(each.fmu).resolve().parent for each in asked.components.values()}
     built = {k: v for place in places for k, v in natives(builder.slaves_of(place), mathematics).items()}
-    components = {key: replace(each, fmu=str(built[Path(each.fmu).stem])) for key, each in asked.components.items()}
+    components = {
+        key: replace(each, fmu=str(built.get(Path(each.fmu).stem, each.fmu))) for key, each in asked.components.items()
+    }
     return run(replace(asked, components=components))
 
 

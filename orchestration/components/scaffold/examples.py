@@ -8,7 +8,7 @@ from orchestration.components.scaffold.folder import expect_new
 
 FOLDERS = ("examples", "studies", "gains")
 """written together: studies read gains"""
-KEPT = (".csv", ".md", ".py", ".toml")
+KEPT = (".c", ".csv", ".h", ".md", ".py", ".toml")
 """Endings of the files that are written: no pictures, and no FMUs, which are built before a run"""
 _SHIPPED = Path(__file__).parent / "shipped"
 """Their place in a wheel, where `setup.py` puts them"""
