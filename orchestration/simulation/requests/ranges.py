@@ -1,6 +1,7 @@
 """Search ranges of limits: the quantities, and the scan of each."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -175,7 +176,19 @@ def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
         variable = model.variables.get(path.removeprefix(prefix)) if path.startswith(prefix) else None
         if variable is not None and variable.unit:
             return variable.unit
+    if (of_signal := _OF_SIGNAL.fullmatch(path)) is not None:
+        units = {
+            variable.unit
+            for model in models.values()
+            for name, variable in model.variables.items()
+            if name == of_signal[1] or name.startswith(f"{of_signal[1]}.")
+        }
+        return units.pop() if len(units) == 1 else None
     return None
+
+
+_OF_SIGNAL = re.compile(r"connections\.[^.]+\.(?:noise|quantisation)\.(.+)")
+"""A path of one signal of a connection, whose unit its value has"""
 
 
 def paths_in(base: Request, target: str) -> tuple[str, ...]:

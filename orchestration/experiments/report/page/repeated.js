@@ -98,7 +98,7 @@ function openRepeated(cell) {
   byId("cell").hidden = false;
   byId("cell-title").textContent = placeOfRepeated(cell);
   const ofFirst = report.repeated.maps.some((each) => each.cells.every(({ runs }) => !runs.length)) ? " of the first study, the only one whose runs are in this file" : "";
-  const hint = cell.runs.length ? `Each point is a run${ofFirst}; click one, or use the arrow keys, to open it.` : "This file does not have its runs.";
+  const hint = cell.runs.length ? `Each point is a run${ofFirst}; click one, or use the arrow keys, to open it.` : "This file does not have its runs; a report of that study alone does.";
   byId("cell-text").textContent = `${cell.said}. ${hint}`;
   map.rows = cell.runs.map(rowOfIndex).filter((row) => row !== undefined);
   map.x = axes.findLast((axis) => ![report.repeated.across, report.repeated.up].includes(axis.name) && !axis.words) ?? axes.at(-1);

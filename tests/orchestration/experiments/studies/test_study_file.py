@@ -12,6 +12,7 @@ from orchestration.experiments.studies.run_key import design_parts, difference, 
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+from orchestration.simulation.requests.ranges import unit_at
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
 from quadcosim import FmuChoice, Scenario, UsageError
@@ -161,6 +162,13 @@ def test_noise_of_one_measurement_leaves_that_of_others(tmp_path: Path) -> None:
     axes = '[[axes]]\nname = "n"\nsets = ["timing.noise.position"]\nvalues = [0.25]\n'
     text = f"[base.timing.noise]\nvelocity = 0.5\n{axes}"
     assert flown(tmp_path, text).connections[0].noise == {"velocity": 0.5, "position": 0.25}
+
+
+def test_the_noise_of_a_signal_has_its_unit(tmp_path: Path) -> None:
+    study = load(tmp_path, '[[axes]]\nname = "n"\nsets = ["timing.noise.position"]\nvalues = [0.25]\n')
+    models = study.files().models_of(study.origin)
+    own = ("noise.position", "quantisation.angular_velocity.x", "noise.none")
+    assert [unit_at(f"connections.measurement.{of}", models) for of in own] == ["m", "rad/s", None]
 
 
 def test_each_run_has_the_seed_of_the_base_unless_seeds_vary(tmp_path: Path) -> None:
