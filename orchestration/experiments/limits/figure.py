@@ -31,7 +31,7 @@ DIGITS = 4
 
 def limit_figure(result: Limit, style: Style = SCREEN) -> Figure:
     """The judged objective over the quantity, or the share of good seeds, with the limits."""
-    across = _quantity(result)
+    across = quantities.setting(result.of, [one.value for one in result.tried], result.unit)
     figure = style.figure(38.0)
     axes = figure.add_subplot()
     if result.confidence is None:
@@ -143,10 +143,6 @@ def _title(result: Limit, across: Quantity) -> str:
     if first.is_good:
         return f"{what}: good throughout{until}"
     return f"{what}: not good at {across.text_of(first.value, DIGITS)}, where the scan begins{until}"
-
-
-def _quantity(result: Limit) -> Quantity:
-    return quantities.setting(result.of, [one.value for one in result.tried], result.unit)
 
 
 def _with_margin(values: list[float]) -> tuple[float, float]:

@@ -11,15 +11,7 @@ import pyarrow.parquet as pq
 from pyarrow import csv
 
 from fmu_kit.new_files import new_files
-from orchestration.experiments.studies.shares import (
-    GOOD,
-    differences_of,
-    differences_of_medians,
-    laws_of,
-    medians_of,
-    shares_of,
-    with_chance,
-)
+from orchestration.experiments.studies import shares
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -148,15 +140,15 @@ def export(
         warn(note)
     tables, units = {"runs": rows}, units_in(path)
     if study is not None and study.cell_names is not None:
-        cells, repeated = study.cell_names, with_chance(rows, study)
-        tables["shares"] = shares_of(repeated, cells)
+        cells, repeated = study.cell_names, shares.with_chance(rows, study)
+        tables["shares"] = shares.shares_of(repeated, cells)
         if metric is not None:
             unit = units.get(metric, "")
-            tables[f"medians_{metric}"] = medians_of(repeated, cells, metric).assign(unit=unit)
-        if (laws := laws_of(rows, cells)) is not None:
-            found = {"differences": differences_of(repeated, cells, laws)}
+            tables[f"medians_{metric}"] = shares.medians_of(repeated, cells, metric).assign(unit=unit)
+        if (laws := shares.laws_of(rows, cells)) is not None:
+            found = {"differences": shares.differences_of(repeated, cells, laws)}
             if metric is not None:
-                medians = differences_of_medians(repeated, cells, laws, metric)
+                medians = shares.differences_of_medians(repeated, cells, laws, metric)
                 found[f"differences_{metric}"] = medians.assign(unit=unit)
             tables |= {n: pd.DataFrame({"law": laws.second, "minus": laws.first, **each}) for n, each in found.items()}
     written = []
@@ -217,7 +209,7 @@ def expect_medians(study: Study | None, metric: str) -> None:
     """Raise `UsageError` for a metric that is no number, and for a study without cells."""
     if study is None or study.cell_names is None:
         raise UsageError(f"--metric {metric}: {OF_CELLS}")
-    known = [name for name in metrics_with(study.metric_names) if name not in (*TEXTS, GOOD)]
+    known = [name for name in metrics_with(study.metric_names) if name not in (*TEXTS, shares.GOOD)]
     if metric not in known:
         raise UsageError(f"--metric {metric}: {expected_name(metric, known)}")
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.simulator import Floats, Integers
+from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import instants_of, seconds
 from orchestration.foundation.recording.recording import KINDS, About, Chunk, Events, Recording
 
@@ -89,7 +89,7 @@ class InFolder:
                 table = _group(self._folder / SIGNALS, signals, group, [*names])
                 yield Chunk(
                     columns=names,
-                    rows=_matrix(table, names),
+                    rows=np.column_stack([_values(table[name]) for name in names]),
                     events=_events(self._folder / EVENTS, _group(self._folder / EVENTS, events, group, _EVENT.names)),
                 )
 
@@ -156,10 +156,6 @@ def _signals_schema(columns: Iterable[str], about: About) -> Any:
 def _signals_table(chunk: Chunk) -> Any:
     columns = [_numbers(values) for values in chunk.signals.values()]
     return pa.Table.from_arrays(columns, schema=_signals_schema(chunk.columns, {}))
-
-
-def _matrix(table: Any, names: tuple[str, ...]) -> Floats:
-    return np.column_stack([_values(table[name]) for name in names])
 
 
 def _events_table(events: Events) -> Any:

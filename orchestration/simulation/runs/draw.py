@@ -47,7 +47,8 @@ def draw(
     if any(view is not views[0] for view in views) or len(components) != 1:
         raise UsageError("expected runs of one system to lay over each other")
     view = views[0]
-    of_signals = {name: _columns(name, view, listed) for name in which or () if not _is_figure(name)}
+    of_views = {name for each in VIEWS.values() for name in each.names}
+    of_signals = {name: _columns(name, view, listed) for name in which or () if name not in of_views}
     drawing = view.load()
     labels = names or labels_of_runs(listed, [f"run {i + 1}" for i in range(len(listed))])
     columns = {*drawing.columns(listed[0].system, listed[0].described)}.union(*of_signals.values())
@@ -56,10 +57,6 @@ def draw(
         figures = {name: drawing.makers[name](runs, style) for name in view.names if which is None or name in which}
         figures |= {name: of_name(name, runs, style) for name in of_signals}
     return {name: figure for name, figure in figures.items() if figure is not None}
-
-
-def _is_figure(name: str) -> bool:
-    return any(name in each.names for each in VIEWS.values())
 
 
 def _columns(name: str, view: View, runs: Sequence[Result]) -> list[str]:

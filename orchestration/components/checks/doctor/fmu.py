@@ -9,17 +9,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from fmu_kit import loader
-from orchestration.components.checks.doctor import sources
-from orchestration.components.checks.doctor.binaries import (
-    LINUX,
-    MACOS,
-    WINDOWS,
-    Binary,
-    UnreadableError,
-    combined,
-    origin_in,
-    read,
-)
+from orchestration.components.checks.doctor import binaries, sources
 from orchestration.components.fmi.access import Interface
 from orchestration.components.fmi.archive import (
     DESCRIPTION,
@@ -49,7 +39,7 @@ ARCHITECTURES = {
     "ppc64": "ppc64",
 }
 """names in FMI 3.0 by the names of the doctor"""
-SYSTEMS = {LINUX: "linux", WINDOWS: "windows", MACOS: "darwin"}
+SYSTEMS = {binaries.LINUX: "linux", binaries.WINDOWS: "windows", binaries.MACOS: "darwin"}
 """names in FMI 3.0 by the names of the doctor"""
 _TUPLES = {
     f"{architecture}-{folder}": (system, (name,))
@@ -59,12 +49,12 @@ _TUPLES = {
 PLATFORMS: Mapping[int, Mapping[str, tuple[str, tuple[str, ...]]]] = {
     2: {
         **{folder: machine for folder, machine in _TUPLES.items() if not folder.startswith("x86")},
-        "linux32": (LINUX, ("x86",)),
-        "linux64": (LINUX, ("x86-64",)),
-        "win32": (WINDOWS, ("x86",)),
-        "win64": (WINDOWS, ("x86-64",)),
-        "darwin32": (MACOS, ("x86",)),
-        "darwin64": (MACOS, ("x86-64", "aarch64")),
+        "linux32": (binaries.LINUX, ("x86",)),
+        "linux64": (binaries.LINUX, ("x86-64",)),
+        "win32": (binaries.WINDOWS, ("x86",)),
+        "win64": (binaries.WINDOWS, ("x86-64",)),
+        "darwin32": (binaries.MACOS, ("x86",)),
+        "darwin64": (binaries.MACOS, ("x86-64", "aarch64")),
     },
     3: _TUPLES,
 }
@@ -83,7 +73,7 @@ class PlatformBinary:
 
     platform: str
     """The folder in `binaries/`."""
-    binary: Binary | None = None
+    binary: binaries.Binary | None = None
     """None: it cannot be read, for the reason in `problem`."""
     finds_python: bool = False
     """Whether it is a loader of this project, which opens a libpython and then pythonfmu's library."""
@@ -166,13 +156,13 @@ def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier:
     if found is None:
         return PlatformBinary(platform=folder, problem=f"expected {' or '.join(expected)}")
     try:
-        binary = read(io.BytesIO(files[found]))
+        binary = binaries.read(io.BytesIO(files[found]))
         finds_python = folder == posixpath.basename(loader.PLATFORM) and loader.BESIDE in files
         if finds_python:
-            binary = combined(binary, read(io.BytesIO(files[loader.BESIDE])))
-    except UnreadableError as error:
+            binary = binaries.combined(binary, binaries.read(io.BytesIO(files[loader.BESIDE])))
+    except binaries.UnreadableError as error:
         return PlatformBinary(platform=folder, problem=f"{found}: {error}")
-    searched = {f"binaries/{folder}"} if binary.system == WINDOWS else set(_inside(binary, folder))
+    searched = {f"binaries/{folder}"} if binary.system == binaries.WINDOWS else set(_inside(binary, folder))
     bundled = {name for name in binary.dependency_names for place in searched if f"{place}/{name}" in files}
     problem = _mismatch(version, folder, binary)
     return PlatformBinary(
@@ -180,13 +170,13 @@ def _platform(files: Mapping[str, bytes], version: int, folder: str, identifier:
     )
 
 
-def _inside(binary: Binary, folder: str) -> list[str]:
+def _inside(binary: binaries.Binary, folder: str) -> list[str]:
     """Folders of the archive in which the loader searches for an ELF library."""
     own = f"binaries/{folder}"
-    return [posixpath.normpath(origin_in(entry, own)) for entry in binary.run_path]
+    return [posixpath.normpath(binaries.origin_in(entry, own)) for entry in binary.run_path]
 
 
-def _mismatch(version: int, folder: str, binary: Binary) -> str | None:
+def _mismatch(version: int, folder: str, binary: binaries.Binary) -> str | None:
     """The problem of a binary whose header is for another machine than its folder; None: there is none."""
     if folder not in PLATFORMS[version]:
         return None
