@@ -1,6 +1,9 @@
 """A linear system in discrete time, and the controllable and observable part of a larger one."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +13,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
-"""Samples of impulse responses, as long as they stay small"""
+"""Samples of impulse responses, powers of two apart, as long as they stay small"""
 LARGEST_RESPONSE = 1e6
 """Largest response, relative to the first"""
 MINIMAL, ROUNDING = 1e-9, 1e-13
@@ -66,7 +69,13 @@ def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
     """
     if not (B.any() and C.any()):
         return np.zeros((0, 0)), np.zeros((0, B.shape[1])), np.zeros((C.shape[0], 0))
-    made, shown = _powers(A, B), _powers(A.T, C.T)
+
+    @cache
+    def power(k: int) -> Floats:
+        """A to a power of two."""
+        return A if k == 1 else np.asarray(power(k // 2) @ power(k // 2))
+
+    made, shown = _responses(power, B), _responses(lambda k: power(k).T, C.T)
     responses = np.concatenate([abs(C @ state).max(axis=1, keepdims=True) for state in made], axis=1).max(axis=1)
     weight = np.tile(np.where(responses > 0.0, responses, 1.0), len(shown))
     reachable, observable = np.hstack(made), np.hstack(shown).T / weight[:, None]
@@ -91,13 +100,12 @@ def _response(A: Floats, B: Floats, C: Floats) -> Any:
     return C @ np.linalg.solve(z * np.eye(len(A)) - A, B.astype(complex)[None])
 
 
-def _powers(A: Floats, B: Floats) -> list[Floats]:
+def _responses(power: Callable[[int], Floats], B: Floats) -> list[Floats]:
     """A^k B for k in `SAMPLES`, each column no larger than that of B: growth would hide all else behind rounding."""
-    found, state, k = [B], B, 0
+    found, state = [B], B
     largest = np.maximum(np.abs(B).max(axis=0), np.finfo(float).tiny)
-    for sample in SAMPLES[1:]:
-        while k < sample:
-            state, k = A @ state, k + 1
+    for before, sample in pairwise(SAMPLES):
+        state = power(sample - before) @ state
         if not np.abs(state).max() <= LARGEST_RESPONSE * np.abs(B).max():
             break
         found.append(state / np.maximum(1.0, np.abs(state).max(axis=0) / largest))
