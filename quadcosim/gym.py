@@ -14,12 +14,13 @@ Importing this registers `quadcosim/Quadrotor-v0`, the paper's flight with your 
 reference's position [m] now: 16 numbers. Positions and velocities are in the inertial frame (north, east, down), \
 angular velocity is in the body frame (front, right, down); the quaternion rotates from body to inertial frame |
 | action | thrust [N], along the body's axis that points up, from 0 to 30; torque about the body's axes [N.m], from -5 \
-to 5: 4 numbers, held over a period |
+to 5: 4 numbers, held over a period, and as late and lossy as the scenario has it. Until the first one arrives \
+`initial` stands; default: hover, m·g of the plant and no torque |
 | reward | 1 / (1 + d²), with the distance d from the reference [m] after the step |
 | episode | the paper's flight of 30 s, a step each 10 ms; terminated 100 m from the reference, or at 1000 rad/s |
 
 `make` and `make_vec` take `scenario`, the flight with its timing, and all that `Environment` takes, as `reward`, `low`,
-`high`, `starts`. Without lanes (no C compiler), `make_vec` needs `vectorization_mode="sync"`.
+`high`, `starts`, `initial`. Without lanes (no C compiler), `make_vec` needs `vectorization_mode="sync"`.
 
 An environment of anything else, as one that rewards little torque::
 

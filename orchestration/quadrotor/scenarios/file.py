@@ -9,6 +9,7 @@ from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed, shown
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
+from orchestration.quadrotor.scenarios.nominal_model import hover_inputs
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing, preset_timing
 from orchestration.quadrotor.scenarios.translation import SYSTEM, DisturbanceChoice, ReferenceChoice
@@ -105,5 +106,7 @@ def _signal(place: str, table: dict[str, Any], kind: type[Signal], folder: Path)
     return kind(**fields, parameters=parameters)
 
 
-SCENARIOS = RequestKind(default=Scenario, from_tables=scenario_from_tables, files=(SYSTEM,))
+SCENARIOS = RequestKind(
+    default=Scenario, from_tables=scenario_from_tables, resting_inputs=hover_inputs, files=(SYSTEM,)
+)
 """Scenarios as a kind of request"""

@@ -1,11 +1,18 @@
-"""Compares plant and controller: the controller's nominal model with the plant's, and their coordinate axes."""
+"""The model of the vehicle: its hover thrust, and what differs from it in the controller: mass, inertia, axes."""
 
 from collections.abc import Mapping
+from typing import Any
 
-from orchestration.quadrotor.scenarios.wiring import RIGID_BODY
+from orchestration.quadrotor.scenarios.wiring import COMMAND, RIGID_BODY
 
 _FRAME, _INDEX = "frame", "frame_index"
 """Parameters of both: their axes, and an index that overrides it unless it is 0"""
+
+
+def hover_inputs(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """The plant's thrust at hover [N], where it has a mass and gravity; from the parameters of runs by their paths."""
+    mass, gravity = (parameters.get(f"plant.{name}") for name in ("mass", "gravity"))
+    return {} if mass is None or gravity is None else {f"plant.{COMMAND[0]}": mass * gravity}
 
 
 def axis_mismatch(parameters: Mapping[str, float]) -> str | None:

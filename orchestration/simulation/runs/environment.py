@@ -40,15 +40,18 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         component: str | None = None,
         starts: InitialValues | None = None,
         observe: Sequence[str] = (),
+        initial: Any = None,
+        in_process: bool = False,
     ) -> None:
         """`low` and `high` bound each number of an action, in the units of the component's outputs.
 
         `reward` computes a number from the values of all columns after a step; those of the last instant for a run that
         has ended early. `starts` draws the values that an episode begins with, by path as axes of studies name them.
         `component` is the one that is replaced; default: the only sampled one. `observe` are columns or signals of
-        sources whose present values follow the measurement. Raises `UsageError` as `Simulation`.
+        sources whose present values follow the measurement. `initial` is the action that stands until the first one
+        arrives; it, its default, and `in_process` are those of `Simulation`. Raises `UsageError` as `Simulation`.
         """
-        self.simulation = Simulation(request, component)
+        self.simulation = Simulation(request, component, initial=initial, in_process=in_process)
         """The simulation that it steps: names of observations and actions, and the result of a finished episode."""
         self._reward, self._starts, self._observe = _chosen(reward, starts, observe, self.simulation.names)
         self.action_space = _actions(self.simulation.commanded, low, high)
@@ -106,14 +109,17 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
         component: str | None = None,
         starts: InitialValues | None = None,
         observe: Sequence[str] = (),
+        initial: Any = None,
+        in_process: bool = False,
     ) -> None:
         """As `Environment`, for `num_envs` of them; `reward` gets arrays with a value for each, and returns one.
 
-        Raises `UsageError` also for FMUs that cannot run in lanes of this process, in a line.
+        Raises `UsageError` also for FMUs that cannot run in lanes of this process, in a line: those of your own need
+        `in_process`; `gymnasium.vector.SyncVectorEnv` steps single ones of any.
         """
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise UsageError(f"num_envs = {shown(num_envs)}: expected a positive whole number")
-        self.runs = SteppedRuns(request, component, num_envs)
+        self.runs = SteppedRuns(request, component, num_envs, initial=initial, in_process=in_process)
         """The runs that it steps: names of observations and actions."""
         self.num_envs = num_envs
         self._reward, self._starts, self._observe = _chosen(reward, starts, observe, self.runs.names)

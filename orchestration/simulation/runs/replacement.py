@@ -1,13 +1,20 @@
 """A system in which the caller's code replaces one component: which one, its inputs, and its outputs."""
 
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from orchestration.components.building import fmus
+from orchestration.components.fmi.instance import start_number
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.resolved import ResolvedRequest, check_against_fmus, columns_of
+from orchestration.simulation.requests.kinds import KINDS
 from orchestration.simulation.runs.arguments import values_by_path
 from orchestration.systems.system.check import recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
@@ -24,11 +31,35 @@ class Replacement:
     component: str
     system: System
     models: Mapping[str, Model]
-    """Models, that of the replaced component without the variables that have no value after initialisation"""
+    """Models, that of the replaced component without the variables that have no value"""
     measured: tuple[str, ...]
     """its inputs that are connected or fed by a source"""
     commanded: tuple[str, ...]
     """its outputs that are connected"""
+    initial: Floats | None
+    """what stands for these before the first command, if the caller says so"""
+
+    def initial_command(self, system: System, parameters: Mapping[str, Any]) -> Sequence[Any]:
+        """What stands for each output before the first command: by default it leaves the inputs as they start.
+
+        `parameters` are all numeric ones by COMPONENT.NAME; where they are arrays, of many runs, so may be the values.
+        Raises `UsageError` for one output that inputs with different values receive.
+        """
+        if self.initial is not None:
+            return [*self.initial]
+        kind = KINDS.of(self.request.kind)
+        resting = {} if kind is None else kind.resting_inputs(parameters)
+        values: dict[str, tuple[str, Any]] = {}
+        for x in system.connections:
+            for start, end in zip(x.start, x.end) if x.sender == self.component else ():
+                variable = self.models[x.receiver].variables[variable_of(end)]
+                value = (resting.get(end, start_number(variable)) - x.offset) / x.scale
+                other, known = values.setdefault(variable_of(start), (end, value))
+                if np.any(known != value):
+                    raise UsageError(
+                        f"initial: expected a command: {start} goes to {other} and {end}, which start differently"
+                    )
+        return [values[name][1] for name in self.commanded]
 
     def resolve(self, values: Mapping[str, Any], seed: int | None) -> ResolvedRequest:
         """Resolve it with other values by target, and a seed; raises `UsageError` for values that are invalid."""
@@ -42,8 +73,11 @@ class Replacement:
         return ResolvedRequest(request=self.request, models=self.models, **vars(fits))
 
 
-def replace_component(request: Request, component: str | None) -> Replacement:
-    """Replace a component of a request; None: the only sampled one. Raises `UsageError` if it cannot be replaced."""
+def replace_component(request: Request, component: str | None, initial: Any) -> Replacement:
+    """Replace a component of a request; None: the only sampled one. Raises `UsageError` if it cannot be replaced.
+
+    `initial` is a command that stands before the first; None: the default.
+    """
     with errors_in_own_terms(request):
         system = request.as_system()
         name = component_named(system, component, "to replace")
@@ -51,10 +85,29 @@ def replace_component(request: Request, component: str | None) -> Replacement:
         measured, commanded = _ends(system, name)
         whole = replace(system, components={**system.components, name: replace(system.components[name], record=None)})
         models = {each: read_model(path) for each, path in fmus.of_components(system.fmus).items()}
-    models[name] = _initialising(models[name], commanded)
+    models[name] = _without_code(models[name], commanded)
     return Replacement(
-        request=request, component=name, system=whole, models=models, measured=measured, commanded=commanded
-    )
+        request=request, component=name, system=whole, models=models, measured=measured, commanded=commanded,
+        initial=None if initial is None else command_of(initial, commanded, "initial"),
+    )  # fmt: skip
+
+
+def command_of(command: Any, names: Sequence[str], what: str) -> Floats:
+    """A command, an array or values by name, as numbers in the order of `names`; raises `UsageError` for others."""
+    if isinstance(command, Mapping):
+        for name in (*command, *names):
+            if name not in names or name not in command:
+                raise UsageError(f"{what}: {name}: expected values of {', '.join(names)}")
+        command = [command[name] for name in names]
+    values: Floats = np.zeros((0, 0))
+    with suppress(TypeError, ValueError):  # of numpy, for what is no array of numbers
+        values = np.asarray(command, dtype=np.float64)
+    if values.shape != (len(names),):
+        raise UsageError(f"{what}: expected {len(names)} numbers: {', '.join(names)}")
+    for name, value in zip(names, values.tolist()):
+        if not math.isfinite(value):
+            raise UsageError(f"{what}: {name} = {value}: expected a finite number")
+    return values
 
 
 def names_of(system: System, models: Mapping[str, Model]) -> tuple[str, ...]:
@@ -93,7 +146,7 @@ def _ends(system: System, component: str) -> tuple[tuple[str, ...], tuple[str, .
     return inputs, outputs
 
 
-def _initialising(model: Model, outputs: Sequence[str]) -> Model:
-    """The model of a component whose FMU is used for initialisation only: inputs, parameters and some outputs."""
-    kept = {name: v for name, v in model.variables.items() if v.causality in ("input", "parameter") or name in outputs}
-    return replace(model, variables=kept)
+def _without_code(model: Model, outputs: Sequence[str]) -> Model:
+    """The model of a component whose FMU is not used: inputs, parameters and some outputs, counted from 0 on."""
+    kept = [v for v in model.variables.values() if v.causality in ("input", "parameter") or v.name in outputs]
+    return replace(model, variables={v.name: replace(v, reference=i) for i, v in enumerate(kept)})

@@ -16,7 +16,7 @@ from orchestration.simulation.engines.batch.shape import Shape, expect_lanes, ou
 from orchestration.simulation.engines.batch.stepped_batch import SteppedBatch
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.runs.columns import columns
+from orchestration.simulation.runs.columns import Columns, columns
 from orchestration.simulation.runs.replacement import names_of, replace_component
 from orchestration.systems.schedule.schedule_cache import ScheduleCache, schedule_key
 from orchestration.systems.system.check import connect_references
@@ -46,23 +46,30 @@ class SteppedRuns:
     are not computed.
     """
 
-    def __init__(self, request: RequestLike, component: str | None, count: int) -> None:
-        """`component` is the one that is replaced; default: the only sampled one.
+    def __init__(
+        self, request: RequestLike, component: str | None, count: int, *, initial: Any, in_process: bool
+    ) -> None:
+        """`component`, `initial` and `in_process` are those of `Simulation`.
 
         Raises `UsageError` as `Simulation`, and for FMUs that cannot run in lanes of this process, in a line.
         """
         self._request = request_of(request)
         with errors_in_own_terms(self._request):
-            found = replace_component(located(self._request.as_system()), component)
+            of_located = replace_component(located(self._request.as_system()), component, initial)
+            self._replacement = found = replace(of_located, request=self._request)
             bare = replace(
                 found.system, objectives={}, optional=(), criterion=replace(found.system.criterion, good=None)
             )
-            foreign = [name for name, model in found.models.items() if not model.is_own]
-            if foreign:
-                raise UsageError(f"components.{foreign[0]}: expected an FMU built here from quadcosim's own sources")
-            self._system = check_against_fmus(connect_references(bare, found.models), found.models).system
-            expect_lanes(self._system, found.models)
-        self._models, self.component = found.models, found.component
+            foreign = [] if in_process else [name for name, model in found.models.items() if not model.is_own]
+            if alone := [name for name in foreign if name != found.component]:
+                raise UsageError(
+                    f"components.{alone[0]}.fmu: not built here from quadcosim's own sources: expected in_process=True "
+                    "to run it in lanes of this process, which it can end"
+                )
+            fits = check_against_fmus(connect_references(bare, found.models), found.models)
+            self._system, self._parameters = fits.system, fits.parameters
+            expect_lanes(self._system, found.models, found.component)
+        self._models = found.models
         self.measured, self.commanded = found.measured, found.commanded
         self.names = names_of(self._system, self._models)
         """The names that have a value"""
@@ -90,6 +97,7 @@ class SteppedRuns:
             several = {id(system): system for system in own.systems}
             known = {key: (outline(each), schedule_key(each)) for key, each in several.items()}
             connected = {key: connect_references(each, self._models) for key, each in several.items()}
+            initial = self._initial(own)
         by_outline: dict[Any, list[int]] = {}
         for i, system in enumerate(own.systems):
             by_outline.setdefault(known[id(system)][0], []).append(i)
@@ -102,7 +110,8 @@ class SteppedRuns:
                         systems=[replaced(connected[id(own.systems[i])], seed=seeds[i]) for i in group],
                         timings=[timings[i] for i in group],
                         parameters={name: column[group] for name, column in own.parameters.items()},
-                    )
+                    ),
+                    initial[:, group],
                 )
                 begun = _Lanes(batch=batch, key=key, lanes=np.arange(len(group)), places=places[group])
                 self._groups.append(begun)
@@ -128,6 +137,16 @@ class SteppedRuns:
         Raises `UsageError`, naming those that there are, for no such name.
         """
         return np.concatenate([group.batch.value(name) for group in self._groups])[self._order]
+
+    def _initial(self, own: Columns) -> Floats:
+        """What the replaced component commands before its first step, shape (outputs, runs)."""
+        initial, parameters = np.zeros((len(self.commanded), own.count)), {**self._parameters, **own.parameters}
+        systems = np.array([id(system) for system in own.systems])
+        for system in {id(system): system for system in own.systems}.values():
+            runs = systems == id(system)
+            for values, value in zip(initial, self._replacement.initial_command(system, parameters)):
+                values[runs] = np.broadcast_to(value, own.count)[runs]
+        return initial
 
     def _collect(self, group: _Lanes) -> None:
         batch, places, lanes = group.batch, group.places, group.lanes
@@ -160,8 +179,10 @@ class SteppedRuns:
 
     def _batch(self, key: Any, system: Any) -> SteppedBatch:
         if key not in self._shapes:
-            self._shapes[key] = Shape(system=system, models=self._models, lanes=self._lanes)
+            self._shapes[key] = Shape(
+                system=system, models=self._models, lanes=self._lanes, replaced=self._replacement.component
+            )
             self._free[key] = []
         if self._free[key]:
             return self._free[key].pop()
-        return SteppedBatch(self._shapes[key], self._schedules, self.component, self.measured, self.commanded)
+        return SteppedBatch(self._shapes[key], self._schedules, self.measured, self.commanded)

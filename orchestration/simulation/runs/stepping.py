@@ -1,10 +1,9 @@
 """A run that is stepped from sample to sample, with the caller's code in place of one component."""
 
-import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from queue import SimpleQueue
 from types import TracebackType
@@ -14,6 +13,7 @@ import numpy as np
 
 from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance, Value
+from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import Named, UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
@@ -22,7 +22,7 @@ from orchestration.foundation.recording.recording import InMemory
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.outcome import RunOutcome, result_of
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
-from orchestration.simulation.runs.replacement import names_of, replace_component
+from orchestration.simulation.runs.replacement import command_of, names_of, replace_component
 from orchestration.simulation.runs.result import Result
 from orchestration.systems.schedule.streams import Streams
 
@@ -39,23 +39,33 @@ class Simulation:
                 measurement = simulation.step(law(measurement))
             print(simulation.result.metrics)
 
-    The component's own FMU computes its outputs at initialisation, with its parameters, and is not called after. All
-    else is as in the run with that FMU, by the same engine, to the bit.
+    The component's own FMU is not called. All else is as in the run with that FMU, by the same engine, to the bit.
     """
 
-    def __init__(self, request: RequestLike, component: str | None = None) -> None:
+    def __init__(
+        self,
+        request: RequestLike,
+        component: str | None = None,
+        *,
+        initial: Any = None,
+        in_process: bool = False,
+    ) -> None:
         """`component` is the one that is replaced; default: the only sampled one.
+
+        `initial` is the command that stands until your first one arrives, which a delay or a loss puts off; default:
+        that with which inputs keep their start values, of a scenario the thrust of hover, m·g, and no torque. FMUs that
+        were not built here from this project's sources have a process each, unless `in_process`.
 
         Raises `UsageError` for a system that cannot run, and for a component that does not exist or has its own clock.
         """
-        self._replacement = replacement = replace_component(request_of(request), component)
+        self._replacement = replacement = replace_component(request_of(request), component, initial)
         self.component = replacement.component
         """The name of the component that is replaced."""
         self.measured = replacement.measured
         """The names in a measurement, in order: its inputs that are connected or fed by a source."""
         self.commanded = replacement.commanded
         """The names in a command, in order: its outputs that are connected."""
-        self._instances = Instances(foreign_apart=True)
+        self._instances = Instances(foreign_apart=not in_process)
         self._thread: threading.Thread | None = None
         self._run: PreparedRun | None = None
         self._outcome: RunOutcome | None = None
@@ -87,8 +97,9 @@ class Simulation:
         anything else, and where no run is under way.
         """
         if self._thread is None:
-            raise UsageError("step: no run is under way; expected reset before it")
-        self._substitute.command[:] = self._read(command)
+            ended = "no run is under way" if self._outcome is None else f"the run is over, {_end_of(self._outcome)}"
+            raise UsageError(f"step: {ended}; expected reset before it")
+        self._substitute.command[:] = command_of(command, self.commanded, "command")
         self._replies.put(True)
         return self._next_measurement()
 
@@ -163,12 +174,15 @@ class Simulation:
     @contextmanager
     def _load(self, path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
         """An instance of a component, or its substitute."""
+        if instance_name == self.component:
+            resolved, model = self._resolved, self._replacement.models[instance_name]
+            initial = self._replacement.initial_command(resolved.system, resolved.parameters)
+            self._substitute = Substitute(path, instance_name, model, self.measured, self.commanded, initial)
+            self._substitute.await_command = self._await_command
+            yield self._substitute
+            return
         with self._instances.load(path, instance_name, access) as instance:
-            if instance_name == self.component:
-                self._substitute = Substitute(instance, self.measured, self.commanded, self._await_command)
-                yield self._substitute
-            else:
-                yield instance
+            yield instance
 
     def _await_command(self) -> None:
         """Wait for a command; raises `Abandoned` if there will be none."""
@@ -208,23 +222,11 @@ class Simulation:
             raise UsageError("no run is under way; expected reset before")
         return self._run
 
-    def _read(self, command: Any) -> Floats:
-        """A command as numbers in order; raises `UsageError` for an invalid one."""
-        names = self.commanded
-        if isinstance(command, Mapping):
-            for name in (*command, *names):
-                if name not in names or name not in command:
-                    raise UsageError(f"command: {name}: expected values of {', '.join(names)}")
-            command = [command[name] for name in names]
-        values: Floats = np.zeros((0, 0))
-        with suppress(TypeError, ValueError):  # of numpy, for what is no array of numbers
-            values = np.asarray(command, dtype=np.float64)
-        if values.shape != (len(names),):
-            raise UsageError(f"command: expected {len(names)} numbers: {', '.join(names)}")
-        for name, value in zip(names, values.tolist()):
-            if not math.isfinite(value):
-                raise UsageError(f"command: {name} = {value}: expected a finite number")
-        return values
+
+def _end_of(outcome: RunOutcome) -> str:
+    """Why a run is over, and when."""
+    why = outcome.termination or ("diverged" if outcome.divergence else "at its end")
+    return f"{why}, t = {outcome.end:g} s"
 
 
 class Abandoned(BaseException):
@@ -232,91 +234,82 @@ class Abandoned(BaseException):
 
 
 class Substitute(Instance):
-    """Initialises with the FMU of the component and does not call it after: the caller computes its outputs."""
+    """In the place of the instance of a component: the caller computes its outputs."""
+
+    await_command: Callable[[], None]
+    """Called at each step: `measurement` is up to date then, and it fills in `command`"""
 
     def __init__(
-        self, instance: Instance, measured: Sequence[str], commanded: Sequence[str], await_command: Callable[[], None]
+        self,
+        path: Path,
+        name: str,
+        model: Model,
+        measured: Sequence[str],
+        commanded: Sequence[str],
+        initial: Sequence[float],
     ) -> None:
-        """`await_command` is called at each step: `measurement` is up to date then, and it fills in `command`."""
-        self._instance, self._await_command = instance, await_command
+        """`initial` is the command that stands until the first."""
         self._measured, self._commanded = list(measured), list(commanded)
-        self._has_begun = self._has_command = False
-        self.path, self.name, self.model = instance.path, instance.name, instance.model
+        self._has_begun = False
+        self.path, self.name, self.model = path, name, model
         self.measurement: Floats = np.zeros(len(measured))
-        self.command: Floats = np.zeros(len(commanded))
-        self.failed = self.stopped = False
-
-    @property
-    def warnings(self) -> list[str]:  # type: ignore[override]
-        """Those of the instance."""
-        return self._instance.warnings
+        self.command: Floats = np.array(initial, dtype=np.float64)
+        self.warnings, self.failed, self.stopped = [], False, False
 
     def begin(self) -> None:
-        """From here on the caller computes each step; before, the FMU is stepped to its first sample."""
+        """From here on the caller computes each step; before, it is stepped to its first sample."""
         self._has_begun = True
 
     def set(self, name: str, value: Value) -> None:
-        """As any instance."""
-        self._instance.set(name, value)
+        """Nothing: parameters are those of the FMU's code."""
 
     def set_tolerance(self, tolerance: float) -> None:
-        """As any instance."""
-        self._instance.set_tolerance(tolerance)
+        """Nothing, likewise."""
 
-    def get(self, name: str) -> Value:
-        """As any instance; after initialisation the value of then."""
-        return self._instance.get(name)
-
-    def reset(self) -> None:
-        """As any instance."""
-        self._instance.reset()
-
-    def close(self) -> None:
-        """As any instance."""
-        self._instance.close()
+    def set_clock(self, period: float, offset: float, *, late: bool) -> None:
+        """Nothing, likewise."""
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """As any instance; once there is a command, of the command."""
-        read, places = self._instance.reader(names, into), [self._commanded.index(name) for name in names]
+        """As any instance, of the command."""
+        places = [self._commanded.index(name) for name in names]
 
         def transfer() -> None:
-            if self._has_command:
-                into[:] = self.command[places]
-            else:
-                read()
+            into[:] = self.command[places]
 
         return transfer
 
     def writer(self, names: Sequence[str], source: Floats) -> Transfer:
         """As any instance; a reference that the FMU follows is no measurement."""
-        write, kept = (
-            self._instance.writer(names, source),
-            [i for i, name in enumerate(names) if name in self._measured],
-        )
+        kept = [i for i, name in enumerate(names) if name in self._measured]
         places = [self._measured.index(names[i]) for i in kept]
 
         def transfer() -> None:
             self.measurement[places] = source[kept]
-            if not self._has_begun:
-                write()
 
         return transfer
 
+    def get(self, name: str) -> Value:
+        """The value of an output."""
+        return float(self.command[self._commanded.index(name)])
+
+    def reset(self) -> None:
+        """Nothing: it is that of one run."""
+        return
+
+    def close(self) -> None:
+        """Nothing, likewise."""
+        return
+
     def enter_initialization(self, start: float, stop: float) -> None:
-        """As any instance."""
-        self._instance.enter_initialization(start, stop)
+        """Nothing: the command is known."""
 
     def exit_initialization(self) -> None:
-        """As any instance."""
-        self._instance.exit_initialization()
+        """Nothing, likewise."""
 
     def step(self, t: float, h: float) -> None:
         """Wait for the outputs of the caller."""
-        if not self._has_begun:
-            self._instance.step(t, h)
-            return
-        self._has_command = True
-        self._await_command()
+        if self._has_begun:
+            self.await_command()
 
     def save(self) -> bytes:
         """Not supported: the state of the caller's code is unknown."""

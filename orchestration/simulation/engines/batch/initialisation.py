@@ -7,9 +7,10 @@ import numpy as np
 from orchestration.components.fmi.instance import convert_value, number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.foundation.basics.c_structures import address
-from orchestration.foundation.basics.simulator import Booleans, Floats
+from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.arrays import BatchArrays, BatchStructures
+from orchestration.simulation.engines.batch.kernels import NoCode
 from orchestration.simulation.engines.batch.run_numbers import RunNumbers, end_of
 from orchestration.simulation.engines.batch.shape import Shape
 from orchestration.simulation.engines.sources import SourceValues
@@ -25,6 +26,8 @@ class Initialisation:
         self._shape, self._arrays, self._structures, self._numbers = shape, arrays, structures, numbers
         self._begins = [np.zeros(shape.lanes) for _ in shape.names]
         """Time at which the own time of each component begins [s]"""
+        self.outputs: tuple[Integers, Floats] = np.zeros(0, dtype=np.int64), np.zeros((0, shape.lanes))
+        """The places of outputs of a component without code, and their initial values"""
 
     def put_values(
         self, systems: Sequence[System], known: Mapping[Call, Floats], first_samples: Sequence[Mapping[str, int]]
@@ -114,9 +117,11 @@ class Initialisation:
         """Compute the outputs of a component in initialisation mode; the lanes in which that fails."""
         lanes = self._shape.lanes
         active, status = np.full(lanes, 2**64 - 1, dtype=np.uint64), np.zeros(lanes, dtype=np.int32)
-        kernel = self._shape.kernels[self._shape.names[index]]
-        kernel.initialise(
-            address(self._arrays.memories[index]), address(active), address(self._begins[index]), address(status)
-        )
+        kernel, memory = self._shape.kernels[self._shape.names[index]], self._arrays.memories[index]
+        if isinstance(kernel, NoCode):
+            places, values = self.outputs
+            memory[places] = values
+        else:
+            kernel.initialise(address(memory), address(active), address(self._begins[index]), address(status))
         failed: Booleans = status != 0
         return failed

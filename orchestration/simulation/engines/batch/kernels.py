@@ -30,6 +30,18 @@ def preferred_lanes() -> int:
         return lanes_of_fmus()
 
 
+class NoCode:
+    """In the place of the kernel of a component whose outputs the caller computes: its variables have a memory."""
+
+    step = steps = 0
+
+    def __init__(self, model: Model) -> None:
+        self.places = len(model.variables)
+
+    def begin(self, memory: int) -> None:
+        """Nothing: what is read is written first."""
+
+
 def component(name: str, model: Model, lanes: int, *, several: bool) -> Lanes:
     """A component in lanes, which can do `several` steps at once; raises as `sources_of`."""
     return _compiled(tuple(sorted(sources_of(name, model).items())), lanes, several)

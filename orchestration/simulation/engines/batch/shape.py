@@ -16,7 +16,7 @@ from orchestration.foundation.basics.identity import IdentityCache
 from orchestration.foundation.basics.simulator import Booleans
 from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.batch.code import ExpressionCode, expression_code
-from orchestration.simulation.engines.batch.kernels import batch, component, preferred_lanes
+from orchestration.simulation.engines.batch.kernels import NoCode, batch, component, preferred_lanes
 from orchestration.simulation.engines.batch.writing import Kind, Leaf
 from orchestration.simulation.engines.structures import ONE_LANE
 from orchestration.simulation.engines.wiring_by_index import Board, Wires
@@ -82,6 +82,8 @@ class Shape:
     system: System
     models: Mapping[str, Model]
     lanes: int
+    replaced: str | None = None
+    """The component whose outputs the caller computes; the references of its variables count them from 0 on"""
 
     def __post_init__(self) -> None:
         for name, one in self.system.components.items():
@@ -94,11 +96,13 @@ class Shape:
     # -- components and connections --------------------------------------------------------------------------------
 
     @cached_property
-    def kernels(self) -> Mapping[str, Lanes]:
+    def kernels(self) -> Mapping[str, Lanes | NoCode]:
         """The kernel of each component; raises `UsageError` naming one that has none."""
         components = self.system.components
         return {
-            name: component(name, model, self.lanes, several=components[name].sampling is None)
+            name: NoCode(model)
+            if name == self.replaced
+            else component(name, model, self.lanes, several=components[name].sampling is None)
             for name, model in self.models.items()
         }
 
@@ -362,11 +366,11 @@ def _ends_of(shape: Shape, x: Connection) -> Ends:
     )  # fmt: skip
 
 
-def expect_lanes(system: System, models: Mapping[str, Model]) -> None:
-    """Compile what runs a system in SIMD lanes, after it was checked against its models.
+def expect_lanes(system: System, models: Mapping[str, Model], replaced: str | None = None) -> None:
+    """Compile what runs a checked system in SIMD lanes, but for a component that is `replaced`.
 
     Raises `UsageError` if it cannot be run in lanes, naming what it lacks; `QuadcosimError` without a compiler.
     """
-    shape = Shape(system=system, models=models, lanes=preferred_lanes())
+    shape = Shape(system=system, models=models, lanes=preferred_lanes(), replaced=replaced)
     assert shape.kernels
     assert shape.library

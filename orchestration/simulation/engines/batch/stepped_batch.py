@@ -16,17 +16,17 @@ _NOTHING_KNOWN: Mapping[Call, Floats] = {}
 
 
 class SteppedBatch(Batch):
-    """Runs in lanes, step by step: the kernel of one component computes its outputs at initialisation only."""
+    """Runs in lanes, step by step, in which the caller computes the outputs of one component."""
 
     def __init__(
-        self, shape: Shape, schedules: ScheduleCache, component: str, measured: Sequence[str], commanded: Sequence[str]
+        self, shape: Shape, schedules: ScheduleCache, measured: Sequence[str], commanded: Sequence[str]
     ) -> None:
-        """`measured` and `commanded` are the names of the component's inputs and outputs that are connected."""
+        """`measured` and `commanded` are the names of the inputs and outputs of `shape.replaced` that are connected."""
         super().__init__(shape, schedules)
         if not hasattr(self._library, "proceed"):
             raise UsageError("runs in lanes that are stepped: expected Linux with the C library of GNU")
+        component = str(shape.replaced)  # it has no code to step it: C waits there
         index, model = shape.names.index(component), shape.models[component]
-        self._structures.components[index].step = None  # so C waits there
         self._memory = self.arrays.memories[index]
         self._inputs = np.array([model.variables[name].reference for name in measured], dtype=np.int64)
         self._outputs = np.array([model.variables[name].reference for name in commanded], dtype=np.int64)
@@ -42,10 +42,15 @@ class SteppedBatch(Batch):
         self.count = 0
         """The number of runs; the others of its lanes are empty"""
 
-    def begin(self, group: Group) -> None:
-        """Begin the runs of a group, and run them to the first step of the component."""
+    def begin(self, group: Group, initial: Floats) -> None:
+        """Begin the runs of a group, and run them to the first step of the component.
+
+        `initial` are its outputs until then, shape (outputs, runs).
+        """
         self.numbers.columns = group.parameters
         self.count = len(group.systems)
+        padding = self._shape.lanes - self.count
+        self._initialisation.outputs = self._outputs, np.pad(initial, ((0, 0), (0, padding)))
         self._set_out(group, _NOTHING_KNOWN)
         self._record(None, self.count)
         self.proceed()

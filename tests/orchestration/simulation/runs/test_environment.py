@@ -1,9 +1,12 @@
 """Environments that Gymnasium's own checker passes, whose episodes are runs."""
 
 import importlib
+import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 import quadcosim
+from orchestration.components.building import fmus
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from tests.native import NATIVE
 from tests.orchestration.components.fmi.small import needs_compiler
@@ -109,9 +113,10 @@ def test_without_gymnasium_one_line_names_the_extra(monkeypatch: pytest.MonkeyPa
 
 
 @needs_compiler
-def test_environments_in_lanes_have_the_episodes_of_each_alone() -> None:
+@pytest.mark.parametrize("initial", [None, [9.0, 0.1, 0.2, 0.3]])
+def test_environments_in_lanes_have_the_episodes_of_each_alone(initial: Any) -> None:
     timing = {"timing.period": 0.02, "timing.delay": 0.01, "timing.jitter": 0.002, "timing.loss": 0.1}
-    settings = {"scenario": SHORT.with_values({**timing, "stop_time": 0.1}), "starts": far}
+    settings = {"scenario": SHORT.with_values({**timing, "stop_time": 0.1}), "starts": far, "initial": initial}
     many = gymnasium.make_vec("quadcosim/Quadrotor-v0", num_envs=6, **settings)
     each = gymnasium.make_vec("quadcosim/Quadrotor-v0", num_envs=6, vectorization_mode="sync", **settings)
     assert isinstance(many, gym.VectorEnvironment)
@@ -134,8 +139,9 @@ def test_environments_in_lanes_have_the_episodes_of_each_alone() -> None:
 
 
 def far(random: np.random.Generator) -> dict[str, float]:
-    """Starts of which some diverge before the end."""
-    return {X: random.uniform(80.0, 98.0), "plant.initial.velocity.x": 100.0}
+    """Starts of vehicles that differ, of which some diverge before the end."""
+    mass = random.uniform(0.5, 2.0)
+    return {X: random.uniform(80.0, 98.0), "plant.initial.velocity.x": 100.0, "plant.mass": mass}
 
 
 @needs_compiler
@@ -188,6 +194,23 @@ def test_the_projects_controller_as_a_policy_flies_as_fly_has_it() -> None:
     assert not terminated.any()
     assert many.runs.value("plant.position.x").tobytes() == flown["plant.position.x"][:, -1].tobytes()
     assert many.runs.value("plant.thrust").tobytes() == flown["plant.thrust"][:, -1].tobytes()
+
+
+@needs_compiler
+def test_foreign_fmus_are_in_lanes_if_they_may_be_and_what_is_replaced_needs_no_code(tmp_path: Path) -> None:
+    plant, controller = (shutil.copy(fmus.locate(fmu), tmp_path) for fmu in (SHORT.plant.fmu, SHORT.controller.fmu))
+    for path in (plant, controller):
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr("extra/changed", "so that it is another file")
+    law = SHORT.with_values({"timing.delay": 0.03}).with_fmus(plant=SHORT.plant.fmu, controller=controller)
+    first, _ = gym.VectorEnvironment(law, reward, num_envs=2, low=LOW, high=HIGH).reset(seed=3)
+    again, _ = gym.Environment(law, reward, low=LOW, high=HIGH).reset(seed=3)
+    assert first[0].tobytes() == again.tobytes()
+    foreign = law.with_fmus(plant=plant, controller=controller)
+    with pytest.raises(UsageError, match=r"^plant.fmu: not built here .* expected in_process=True to run it in lanes"):
+        gym.VectorEnvironment(foreign, reward, num_envs=2, low=LOW, high=HIGH)
+    inside, _ = gym.VectorEnvironment(foreign, reward, num_envs=2, low=LOW, high=HIGH, in_process=True).reset(seed=3)
+    assert inside.tobytes() == first.tobytes()
 
 
 @needs_compiler

@@ -1,6 +1,7 @@
 """Code of the caller in the place of a component: the run is the one with the FMU of the same law, to the byte."""
 
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,8 +28,14 @@ def law(t: float, measured: np.ndarray) -> list[float]:
     return [found.thrust, *found.torque]
 
 
+def initial(scenario: Scenario, **reset: Any) -> list[float]:
+    """The command of the law when it is initialised, from the state of the plant."""
+    with Simulation(scenario.with_changes(timing=vars(SHORT.timing))) as at_once:
+        return law(0.0, at_once.reset(**reset))
+
+
 def stepped(scenario: Scenario, **reset: Any) -> Result:
-    with Simulation(scenario) as simulation:
+    with Simulation(scenario, initial=initial(scenario, **reset)) as simulation:
         measured = simulation.reset(**reset)
         while not simulation.is_over:
             measured = simulation.step(law(simulation.time, measured))
@@ -76,7 +83,7 @@ def test_each_run_has_its_seed_and_its_values() -> None:
 def test_a_run_that_is_left_leaves_nothing_to_the_next() -> None:
     expected = stepped(SHORT)
     before = threading.active_count()
-    with Simulation(SHORT) as simulation:
+    with Simulation(SHORT, initial=initial(SHORT)) as simulation:
         simulation.reset(values={"plant.initial.position.x": 3.0})
         simulation.step([9.0, 0.1, 0.1, 0.1])
         measured = simulation.reset()
@@ -85,6 +92,38 @@ def test_a_run_that_is_left_leaves_nothing_to_the_next() -> None:
         assert simulation.result.rows.tobytes() == expected.rows.tobytes()
         simulation.reset()
     assert threading.active_count() == before
+
+
+def test_hover_stands_until_the_first_command_arrives_or_what_is_given() -> None:
+    late = SHORT.with_changes(timing={"delay": 0.03}, plant={"mass": 2.0}, model_mismatch=True)
+    given = dict(zip(("thrust", "torque.x", "torque.y", "torque.z"), (9.0, 0.1, 0.2, 0.3)))
+    for command, expected in ((None, [2.0 * 9.81, 0.0, 0.0, 0.0]), (given, [*given.values()])):
+        with Simulation(late, initial=command) as simulation:
+            simulation.reset()
+            while not simulation.is_over:
+                simulation.step([1.0, 0.0, 0.0, 0.0])
+            thrust, *torque = (simulation.result.signals[f"plant.{name}"] for name in given)
+        assert np.transpose([thrust, *torque])[:6].tolist() == [expected] * 6
+        assert thrust[6] == 1.0
+    with pytest.raises(UsageError, match=r"^initial: expected 4 numbers: thrust, torque.x"):
+        Simulation(late, initial=[1.0])
+
+
+def test_inputs_of_a_system_keep_their_start_values_until_the_first_command() -> None:
+    late = SHORT.with_changes(timing={"delay": 0.03}, plant={"mass": 2.0}).as_system()
+    *others, command = late.connections
+    scaled = replace(late, connections=(*others, replace(command, scale=2.0, offset=1.0)))
+    with Simulation(scaled) as simulation:
+        simulation.reset()
+        assert simulation.values["plant.thrust"] == 9.81
+        assert simulation.step([0.0] * 4).shape == (13,)
+        assert simulation.values["plant.thrust"] == 9.81
+    gust = replace(command, name="gust", start=("controller.thrust",), end=("plant.external_force.x",))
+    with (
+        Simulation(replace(late, connections=(*late.connections, gust))) as simulation,
+        pytest.raises(UsageError, match=r"^initial: expected a command: controller.thrust goes to plant.thrust and"),
+    ):
+        simulation.reset()
 
 
 def test_a_plant_can_be_replaced_too() -> None:
@@ -150,6 +189,13 @@ def test_steps_without_a_run_and_components_that_are_none_are_refused() -> None:
     with Simulation(SHORT) as simulation:
         with pytest.raises(UsageError, match=r"^step: no run is under way; expected reset before it$"):
             simulation.step([0.0] * 4)
+        simulation.reset(values={"stop_time": 0.02})
+        simulation.step([9.81, 0.0, 0.0, 0.0])
+        with pytest.raises(
+            UsageError, match=r"^step: the run is over, at its end, t = 0.02 s; expected reset before it$"
+        ):
+            simulation.step([0.0] * 4)
+    with Simulation(SHORT) as simulation:
         with pytest.raises(UsageError, match=r"^result: the run is not over; expected it after the last step$"):
             _ = simulation.result
         with pytest.raises(UsageError, match=r"^no run is under way; expected reset before$"):
