@@ -128,7 +128,7 @@ def _of_hover(request: "Request") -> CommandResult:
         raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH, as connections.NAME.delay_jitter")
     found = isolated_call(files_of(system_of(request)).fmus.values(), margin_of, request)
     document, lines = dataclasses.asdict(found), []
-    for name, value in document.items():
+    for name, value in ((name, value) for name, value in document.items() if name != "in_double"):  # the verdict has it
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value
         lines.append(f"{name:<17}  {f'{value:.6g} s' if isinstance(value, float) else '-' if value is None else shown}")
     return CommandResult(document=document, verdict=found.verdict, lines=lines)

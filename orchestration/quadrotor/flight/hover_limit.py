@@ -17,6 +17,7 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import Request
 from orchestration.theory.stability.delay_bounds import SampledLoop, breaking_jitter, certain_jitter
+from orchestration.theory.stability.in_double import of_code
 from orchestration.theory.stability.known_loops import KnownLoop, LinearLimit
 from orchestration.theory.stability.local_limit import about_rest
 
@@ -89,7 +90,7 @@ def about_hover(scenario: Scenario, of: str) -> LinearLimit:
     return LinearLimit(
         limit=limit,
         outside=None if edge is None else local_limit(loop.with_law(edge), edge, of),
-        method=HOVER,
+        method=f"{HOVER}{of_code(loop.in_double)}",
         accuracy=None if limit is None else HOVER_ACCURACY * limit,
         reason=""
         if limit is not None
@@ -125,6 +126,8 @@ class Margin:
     """the smallest addition found that can make it unstable; None: no sequence that was tried does"""
     breaking_sequence: tuple[float, ...]
     """the shares of it, in turn, that do"""
+    in_double: tuple[str, ...] = ()
+    """the components whose float code in C is taken in double precision"""
 
     @property
     def verdict(self) -> str:
@@ -134,7 +137,8 @@ class Margin:
         else:
             constant = f"stable up to a constant delay of {quantity(self.delay_limit, 's')}"
         varying = f"and with any sequence of delays up to {quantity(self.delay + self.certain_jitter, 's')}"
-        return f"{constant}, {varying}, sampled every {quantity(self.period, 's')} (small deviations from hover)"
+        of = f"(small deviations from hover{of_code(self.in_double)})"
+        return f"{constant}, {varying}, sampled every {quantity(self.period, 's')} {of}"
 
 
 def margin_of(scenario: Scenario) -> Margin:
@@ -155,4 +159,5 @@ def margin_of(scenario: Scenario) -> Margin:
         certain_jitter=certain_jitter(loop),
         breaking_jitter=None if broken is None else broken[0],
         breaking_sequence=() if broken is None else broken[1],
+        in_double=hover.in_double,
     )

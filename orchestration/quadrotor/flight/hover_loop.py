@@ -30,6 +30,7 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import ControlLoop
 from orchestration.theory.stability.delay_bounds import turn_of
+from orchestration.theory.stability.in_double import are_in_double, expect_same_law, in_double
 
 _COMMANDS = len(wiring.COMMAND)
 _FORGOTTEN = 1e-9
@@ -39,7 +40,8 @@ _FORGOTTEN = 1e-9
 class HoverLoop:
     """The linear closed loop of a scenario about hover, for any period and delay."""
 
-    def __init__(self, feedback: Floats, step: PlantStep) -> None:
+    def __init__(self, feedback: Floats, step: PlantStep, in_double: tuple[str, ...]) -> None:
+        self.in_double = in_double
         self._feedback = np.pad(feedback, ((0, 0), (0, step.size - len(COORDINATES))))
         self._step = step
 
@@ -49,12 +51,12 @@ class HoverLoop:
         _expect_one_feedback(scenario)
         hover, fleet = located(hover_of(scenario)), Instances()
         trim, feedback = controller_at_hover(hover, fleet)
-        return cls(feedback, PlantStep(hover, fleet, trim))
+        return cls(feedback, PlantStep(hover, fleet, trim), are_in_double(hover.as_system().components))
 
     def with_law(self, scenario: Scenario) -> "HoverLoop":
         """The loop of the same plant with the controller of `scenario`, whose command at hover must be the same."""
         _, feedback = controller_at_hover(located(hover_of(scenario)), Instances())
-        return HoverLoop(feedback, self._step)
+        return HoverLoop(feedback, self._step, self.in_double)
 
     def continuous(self) -> tuple[Floats, Floats, Floats]:
         """A and B of the plant in continuous time, dx = A x + B u, and F of its controller, u = F x."""
@@ -78,9 +80,11 @@ def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floa
 
     Raises `UsageError` for a controller with memory: its command is not a function of the vehicle's state.
     """
+    at_rest = measurement_at({})
+    held = {"plant": {}, "controller": dict(zip(wiring.MEASUREMENT, at_rest.tolist()))}
+    expect_same_law(hover.as_system(), fleet, held)
     with prepared(hover, load=fleet.load) as flight:
         controller = flight.instances["controller"]
-        at_rest = measurement_at({})
         controller.initialise(wiring.MEASUREMENT, at_rest)
         has_layer = wiring.BOUNDARY_LAYER in controller.variables
         layer = float(controller.get(wiring.BOUNDARY_LAYER)) if has_layer else 1.0
@@ -110,7 +114,8 @@ def controller_at_hover(hover: Scenario, fleet: Instances) -> tuple[Floats, Floa
 
 
 def located(hover: Scenario) -> Scenario:
-    """`hover` with its FMUs by their paths."""
+    """`hover` with its FMUs by their paths, float code in C in double precision."""
+    hover = in_double(hover)
     return hover.with_fmus(plant=fmus.locate(hover.plant.fmu), controller=fmus.locate(hover.controller.fmu))
 
 

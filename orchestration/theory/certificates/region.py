@@ -20,6 +20,7 @@ from orchestration.theory.certificates.breaking import BreakingSequence, least_b
 from orchestration.theory.certificates.certified_loop import LOSS
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.stability.in_double import are_in_double, of_code
 
 COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""
@@ -47,11 +48,14 @@ class Region:
     """The size of the state from period to period."""
     certificates: tuple[str, ...]
     """The proofs, one for each certified pair, as the texts of files that `check` verifies."""
+    in_double: tuple[str, ...] = ()
+    """The components whose float code in C is taken in double precision."""
 
     @property
     def verdict(self) -> str:
         """How many pairs of values are proved stable, and how many break the loop."""
-        return f"{len(self.certified)} pairs are proved stable, {len(self.breaking)} break the loop (small deviations)"
+        counts = f"{len(self.certified)} pairs are proved stable, {len(self.breaking)} break the loop"
+        return f"{counts} (small deviations{of_code(self.in_double)})"
 
     def save(self, folder: str | Path, style: Style = SCREEN) -> list[Path]:
         """Write the certificates, `1.json` and so on, and the figure, into a folder; the paths."""
@@ -120,6 +124,7 @@ def margin_region(
                 texts.append(text)
     return Region(
         of=paths, certified=tuple(certified), breaking=tuple(breaking), certificates=tuple(texts),
+        in_double=are_in_double(timeline.loop.system.components),
         states=len(timeline.family([0.0, 0.0]).kept),
         searched=f"draws at either end of both ranges, sequences that repeat after at most {LONGEST_SEQUENCE}",
     )  # fmt: skip

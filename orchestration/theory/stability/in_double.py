@@ -38,12 +38,12 @@ _SAME: set[str] = set()
 """What has been compared"""
 
 
-def in_double(system: System) -> System:
-    """The system with float code in C in double precision, where that has a state that can be saved.
+def in_double(request: fmus.Twin) -> fmus.Twin:
+    """A system, or its request, with float code in C in double precision, where its state can be saved.
 
     Raises `UsageError` for code that cannot be compiled so.
     """
-    return system.with_twins(_twin)
+    return request.with_twins(_twin)
 
 
 def _twin(fmu: str) -> str:

@@ -17,10 +17,13 @@ from fmu_kit.bundle import Target
 from orchestration.components.building import builder
 from orchestration.components.building.models import CONTROLLERS, MODELS
 from orchestration.components.fmi.read_description import read_model
+from orchestration.components.fmi.reuse import Instances
 from orchestration.components.scaffold.folder import write
 from orchestration.experiments.live.live import live
 from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.documents import read_toml
+from orchestration.quadrotor.flight.hover import hover_of
+from orchestration.quadrotor.flight.hover_loop import controller_at_hover, located
 from orchestration.simulation.requests.one_fmu import alone
 from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.simulation import run
@@ -367,11 +370,19 @@ def test_what_new_writes_in_c_passes_its_tests_and_flies_a_vehicle(hover: Path) 
     assert not result.metrics["diverged"]
 
 
-def test_its_delay_limit_by_theory_comes_from_the_process_of_its_fmu(hover: Path, main: Main) -> None:
-    flight = ("--controller", hover, "--reference", "hover", "--stop-time", "0.5", "--build")
+def test_its_delay_limit_by_theory_comes_from_the_process_of_its_fmu_and_is_that_of_floats(
+    hover: Path, main: Main, tmp_path: Path
+) -> None:
+    for path in hover.parent.glob("hover_c.[cht]*"):
+        (tmp_path / path.name).write_text(path.read_text().replace("double", "float"))
+    floats = tmp_path / hover.name
+    flight = ("--controller", floats, "--reference", "hover", "--stop-time", "0.5", "--build")
     asked = ("--of", "delay", "--from", "0", "--to", "0.1", "--scan", "0.1", "--tolerance", "0.1", "--no-figures")
     found = json.loads(main("limit", *flight, *asked, "--json").stdout)
     assert found["local_limit"] == pytest.approx(0.0635, abs=2e-4)
+    assert found["local_method"].endswith(", float code of controller in double precision")
+    _, feedback = controller_at_hover(located(hover_of(Scenario(controller=FmuChoice(fmu=str(floats))))), Instances())
+    assert feedback[0] == pytest.approx([0.0, 0.0, 4.0, 0.0, 0.0, 3.5, *[0.0] * 6], abs=1e-6)  # 9.81 N, and two gains
 
 
 BASE = """
