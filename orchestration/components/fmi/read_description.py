@@ -299,6 +299,14 @@ class Model:
         """Inputs that an output depends on in steps, by output; None: not declared."""
         return _dependencies(self.description.outputs, self.variables, None)
 
+    def is_clocked(self, name: str) -> bool:
+        """Whether a variable changes at ticks of the clocks only; before the first one it has its start value."""
+        return bool(self.ticking) and self.variables[name].whole in self._clocked
+
+    @cached_property
+    def _clocked(self) -> frozenset[str]:
+        return frozenset(v.name for v in self.description.modelVariables if v.clocks)
+
     def depends_on(self, output: str) -> frozenset[str] | None:
         """The inputs that an output depends on at initialisation; None: on all of them, or unknown."""
         return self.initial_dependencies.get(output)

@@ -38,11 +38,13 @@ class Master:
         *,
         first_exchange: Sequence[Sequence[int]] | None = None,
         waiting: Collection[str] = (),
+        never_computed: Collection[str] = (),
         loop: Callable[[RunningSystem, Recorder], Loop] = PythonLoop,
     ) -> None:
         """`waiting` are components that begin at 0 and are stepped to their first sample without sampling.
 
-        Other sampled components, unless they have their own clock, begin at their first sample.
+        Other sampled components, unless they have their own clock, begin at their first sample. To a first-order hold
+        the first exchange of a connection that is `never_computed` is none that was applied.
         """
         self.running = running
         self.board, self.columns, self.recorder = running.board, running.columns, recorder
@@ -53,7 +55,7 @@ class Master:
         self._first_exchange = (
             [(i,) for i in range(len(running.channels))] if first_exchange is None else first_exchange
         )
-        self._waiting = waiting
+        self._waiting, self._never_computed = waiting, never_computed
         self._loop = loop(running, recorder)
         self.backlog = self._loop.backlog
         self.engine = self._loop.engine
@@ -156,8 +158,9 @@ class Master:
         for name in running.wires.names:
             running.simulators[name].exit_initialization()
             running.readers[name]()
-        for channel in running.channels:
-            channel.start()
+        for connection, channel in zip(running.system.connections, running.channels, strict=True):
+            if connection.name not in self._never_computed:
+                channel.start()
         for index in range(len(running.wires.names)):
             running.component(index).expect_finite(0.0)
         for name in self._waiting:

@@ -272,6 +272,13 @@ def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedS
     return steps
 
 
+def never_computed(system: System, models: Mapping[str, Model]) -> frozenset[str]:
+    """The connections whose first exchange has start values of clocked outputs, which are computed at ticks only."""
+    return frozenset(
+        x.name for x in system.connections if any(models[x.sender].is_clocked(variable_of(start)) for start in x.start)
+    )
+
+
 def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str, tuple[float, float]]:
     """The components whose code believes another sampling period than theirs: theirs, also their step or that of their
     task on a computer, and what it believes [s].

@@ -1,7 +1,7 @@
 """The metrics of a run: the objectives and the criterion of its system."""
 
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -125,15 +125,21 @@ def columns_used(system: System, columns: Sequence[str]) -> tuple[str, ...]:
 
 
 def spans(
-    system: System, recording: Recording, parameters: Mapping[str, float], end: float, points: Points | None
+    system: System,
+    recording: Recording,
+    parameters: Mapping[str, float],
+    end: float,
+    points: Points | None,
+    never_computed: Collection[str] = (),
 ) -> Iterator[Recorded]:
     """The data that expressions of a run up to `end` [s] use, chunk by chunk, each with the last row of the one before.
 
-    `points` are those of its components in continuous time; None: all have one at every row. The `stop_time` is the
+    `points` are those of its components in continuous time; None: all have one at every row. The first values of
+    connections that are `never_computed` do not count to a first-order hold. The `stop_time` is the
     end, so that the last third of an interrupted run is that of its recording.
     """
     columns = columns_used(system, recording.columns)
-    lines = {x.name: _Line() for x in system.connections if x.hold == "first"}
+    lines = {x.name: _Line(x.name not in never_computed) for x in system.connections if x.hold == "first"}
     before: Floats | None = None
     chunks = recording.chunks(columns)
     for chunk in chunks if points is None else cut_at_points(system, chunks, points):
@@ -248,7 +254,8 @@ def _ends(
 class _Line:
     """First-order hold: the line through the last two values that arrived, continued from chunk to chunk."""
 
-    def __init__(self) -> None:
+    def __init__(self, from_first_exchange: bool) -> None:
+        self._begins = from_first_exchange
         self._last: dict[str, list[tuple[float, float]]] = {}
 
     def ends(self, time: Floats, values: Mapping[str, Floats], arrived: Booleans) -> dict[str, Floats]:
@@ -258,8 +265,8 @@ class _Line:
     def _end(self, name: str, time: Floats, held: Floats, arrived: Booleans) -> Floats:
         past = self._last.get(name)
         rows = np.flatnonzero(arrived)
-        if past is None:  # the value of initialisation is the first
-            past = [(float(time[0]), float(held[0]))]
+        if past is None:  # the value of initialisation is the first, or one from which no line rises
+            past = [(float(time[0]) if self._begins or arrived[0] else -np.inf, float(held[0]))]
             rows = rows[rows > 0]
         points = [*past, *((float(time[i]), float(held[i])) for i in rows)]
         times, heights = np.array(points).T

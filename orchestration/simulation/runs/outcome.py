@@ -14,6 +14,7 @@ from orchestration.simulation.engines.resolved import (
     ResolvedRequest,
     fixed_steps,
     idle_partitions,
+    never_computed,
     periods_in_words,
     uneven_steps,
 )
@@ -71,10 +72,11 @@ def result_of(
     recording = recorder.finish()
     numbers = {**resolved.parameters, **resolved.of_jobs}
 
+    unset = never_computed(resolved.system, resolved.models)
     points = points_of(resolved.system, fixed_steps(resolved.system, resolved.models), nanoseconds(outcome.end))
 
     def spans() -> Iterator[Recorded]:
-        return objectives.spans(resolved.system, recording, numbers, outcome.end, points)
+        return objectives.spans(resolved.system, recording, numbers, outcome.end, points, unset)
 
     metrics = objectives.compute(
         resolved.system,

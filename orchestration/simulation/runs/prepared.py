@@ -25,7 +25,7 @@ from orchestration.simulation.engines import initial
 from orchestration.simulation.engines.condition import Condition
 from orchestration.simulation.engines.master import Engine, Master, create_master
 from orchestration.simulation.engines.memory import Allocator, process_memory
-from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, resolve
+from orchestration.simulation.engines.resolved import Announce, ResolvedRequest, fixed_steps, never_computed, resolve
 from orchestration.simulation.engines.running_system import RunningSystem
 from orchestration.simulation.engines.sources import Feed, SourceValues, TableValues
 from orchestration.simulation.runs.outcome import Course, Progress, RunOutcome, result_of
@@ -178,6 +178,7 @@ def prepared(
                 allocate=allocate,
                 first_exchange=initial.groups(system.connections, lambda name, output: models[name].depends_on(output)),
                 waiting=[name for name in system.components if models[name].waits],
+                never_computed=never_computed(system, models),
             )
         run = PreparedRun(
             resolved=resolved,

@@ -11,6 +11,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import exact_nanoseconds
 from orchestration.simulation.engines.master import Master
+from orchestration.simulation.engines.resolved import never_computed
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import System
@@ -96,6 +97,9 @@ def _measured(
     Its `accuracy` is that of the coordinates.
     """
     with prepared(system, load=tracing_loader(instances)) as run:
+        unset = never_computed(run.system, run.models)
+        for name in (x.name for x in system.connections if x.hold == "first" and x.name in unset):
+            raise UsageError(f"connections.{name}.hold: expected zero over a horizon: its line has no first value")
         run.master.initialise()
         if run.master.divergence is not None:
             raise UsageError(f"it diverges at its initialisation: {run.master.divergence}")

@@ -74,6 +74,26 @@ def test_with_jitter_and_delay_each_row_is_that_of_the_exact_hold(tmp_path: Path
     assert np.abs(np.transpose([one.signals["plant.x1"], one.signals["plant.x2"]]) - expected).max() < 1e-12
 
 
+def test_to_a_first_order_hold_a_start_value_that_no_tick_computed_is_no_command(tmp_path: Path) -> None:
+    system = {**loop(tmp_path, FAST, delay=0.2, period=0.5), "stop_time": 1.0}
+    system["connections"][1]["hold"] = "first"
+    system["objectives"] = {"effort": "integral(plant.u ** 2)"}
+    one, other = (quadcosim.run(system, engine=engine, in_process=True) for engine in ("python", "compiled"))
+    assert one.rows.tobytes() == other.rows.tobytes()
+    u, t = one.signals["plant.u"], one.signals["time"]
+    assert (u[t < 0.2] == 0.0).all()
+    assert (u[(t >= 0.2) & (t < 0.7)] == -1.0).all()  # of y = -x - v at 0: (1, 0)
+    assert one.metrics["effort"] == pytest.approx(0.5 + _square_of_line(one.signals["law.y"][t == 0.5][0]))
+    assert fly_until(system, 0.45, tmp_path / "paused", in_process=True) is None
+    assert resume(tmp_path / "paused", in_process=True).rows.tobytes() == one.rows.tobytes()
+
+
+def _square_of_line(second: float) -> float:
+    """Of the line from -1 at 0.2 s through `second` at 0.7 s, squared, from there to 1 s."""
+    end = second + (second + 1.0) / 0.5 * 0.3
+    return 0.3 * (second**2 + second * end + end**2) / 3.0
+
+
 def test_jitter_and_loss_apply_and_a_paused_run_goes_on(tmp_path: Path) -> None:
     system = loop(tmp_path, FAST, clock("slow", "fixed", 'intervalDecimal="1.5" shiftDecimal="1"', 31), jitter=0.2)
     system["connections"][0].update(delay=0.07, loss=0.3)
