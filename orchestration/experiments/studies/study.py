@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from orchestration.components.building.fmus import native_twin, native_twins
 from orchestration.components.building.models import PATHS
@@ -59,6 +59,10 @@ class Study:
     """Whether it is run with the native twins of its FMUs."""
     folder: Path | None = None
     """The folder at which paths of files in values of axes start; None: the current one."""
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        "design": "the keys of [design] are arguments: method, samples, design_seed, vary_seed, repeat"
+    }
+    """Hints where the content of these keys belongs"""
 
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]

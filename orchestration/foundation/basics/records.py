@@ -199,6 +199,8 @@ def _expect_names(cls: type, place: str, args: Sequence[Any], kwargs: Mapping[st
         raise _unexpected(cls.__name__, args[0], f"values by name, as in {names[0]}=…") from None
     for name in kwargs:
         if name not in names:
+            if name in (elsewhere := getattr(cls, "ELSEWHERE", {})):
+                raise UsageError(f"{place}{name}: no such key; {elsewhere[name]}") from None
             in_files = ", ".join(getattr(cls, "SHORTHANDS", ()))
             raise UsageError(no_such_key(place, name, names, in_files and f", or in files {in_files}")) from None
     for field in fields:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import Named, UsageError
+from orchestration.foundation.basics.errors import Named, UsageError, expected_name
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.statistics import Estimate, wilson
 from orchestration.simulation.results.objectives import OUTCOME, how_runs_ended
@@ -69,8 +69,9 @@ class Flights(Mapping[str, Any]):
     def share(self, name: str = "good", *, axis: Any = None, where: Any = True, confidence: float = 0.95) -> Estimate:
         """The share of runs of which an output is true, with Wilson's interval, over all axes, or over one or several.
 
-        Of a part of the axes, numbers are arrays over the others. `where` are truth values that choose runs. Raises
-        `UsageError` for an output that is no truth value in each run, and where no run is chosen.
+        An axis is a number, or its name in `to_xarray`. Of a part of the axes, numbers are arrays over the others.
+        `where` are truth values that choose runs. Raises `UsageError` for an output that is no truth value in each run,
+        and where no run is chosen.
         """
         values, chosen = self[name], np.asarray(where)
         if values.dtype != np.bool_:
@@ -79,9 +80,15 @@ class Flights(Mapping[str, Any]):
             if chosen.dtype != np.bool_:
                 raise ValueError("where are no truth values")
             chosen = np.broadcast_to(chosen, values.shape)
-            count, true = chosen.sum(axis=axis), (values & chosen).sum(axis=axis)
+            places = self._places(axis)
+            count, true = chosen.sum(axis=places), (values & chosen).sum(axis=places)
         except (TypeError, ValueError) as error:  # NumPy's error of an axis is a ValueError too
             raise UsageError(f"share of {name}: {error}; expected axes and truth values of {values.shape}") from None
+        if not count.all():
+            of = "" if count.ndim == 0 else f" at {np.count_nonzero(count == 0)} of {count.size} places"
+            raise UsageError(
+                f"share of {name}: where chooses no run{of}; expected one at least, of which to have a share"
+            )
         bounds = [wilson(int(of), int(all_of), confidence) for of, all_of in zip(true.flat, count.flat)]
         low, high = (np.reshape(ends, count.shape) for ends in zip(*bounds))
         as_given: Any = np.asarray if count.shape else float
@@ -141,6 +148,17 @@ class Flights(Mapping[str, Any]):
     @property
     def _outputs(self) -> dict[str, Any]:
         return {name: array for name, array in self.arrays.items() if name not in self.recorded}
+
+    def _places(self, axis: Any) -> Any:
+        """The number of an axis, or a tuple of those of several, of which some are given by name."""
+        if isinstance(axis, tuple | list):
+            return tuple(map(self._places, axis))
+        if not isinstance(axis, str):
+            return axis
+        names = self._axes()[0]
+        if axis not in names:
+            raise UsageError(f"axis = {axis}: {expected_name(axis, names)}")
+        return names.index(axis)
 
     def _axes(self) -> tuple[tuple[str, ...], dict[str, Any]]:
         """The names of the axes, and coordinates of the given values."""

@@ -108,7 +108,7 @@ def result_of(
         },
         warnings=(
             *resolved.request.mismatches(resolved.parameters),
-            *map(resolved.request.in_own_terms, resolved.system.too_short()),
+            *map(resolved.request.in_own_terms, resolved.system.oversights()),
             *uneven_steps(resolved.system, resolved.models),
             *periods_in_words(resolved.system, resolved.models),
             *idle_partitions(resolved.system, resolved.models),

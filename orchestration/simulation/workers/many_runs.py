@@ -277,7 +277,7 @@ def _warn_of_mistakes(
     for place in sorted(places.union(first_differences(runs.parameters, parameters))):
         system = runs.alone(place)
         of_model = request.mismatches(numeric_parameters(system, models))
-        if texts := [*of_model, *map(request.in_own_terms, system.too_short())]:
+        if texts := [*of_model, *map(request.in_own_terms, system.oversights())]:
             for text in texts:
                 warn(text)
             return

@@ -161,10 +161,12 @@ class System:
     def near_continuous(self, period: float) -> None:
         """None: which of its components are the digital ones is not known."""
 
-    def too_short(self) -> Iterator[str]:
-        """A warning for each component and connection for which the run is too short."""
+    def oversights(self) -> Iterator[str]:
+        """Warnings of components and connections for which the run is too short, and for a quaternion set in part."""
         end, stop = f"the run ends at {shown(self.stop_time)} s", nanoseconds(self.stop_time)
         for name, component in self.components.items():
+            for first, others in _quaternions_in_part(component.parameters):
+                yield f"components.{name}.parameters.{first}: is set without {others}, which keep their start values"
             sampling, place = component.sampling, f"components.{name}.sampling"
             if sampling is None or has_scheduled_instants(sampling):
                 continue
@@ -246,10 +248,24 @@ class System:
         return feeds + [(f"sources.{name}", None, end) for name, source in self.sources.items() for end in source.to]
 
 
+_PARTS = ("x", "y", "z", "w")
+"""The parts of a quaternion"""
 _CAUSES = ("delay", "delay_jitter", "loss", "noise")
 """The random streams of a connection"""
 TASK_CAUSES, MESSAGE_CAUSES = ("execution", "jitter", "arrivals"), ("jitter", "arrivals", "error")
 """The random streams of a task, and of a message"""
+
+
+def _quaternions_in_part(parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Of each quaternion of which some parts are set, the first of these, and the others in words."""
+    found: dict[str, list[str]] = {}
+    for name in parameters:
+        stem, _, axis = name.rpartition(".")
+        if stem.endswith("quaternion") and axis in _PARTS:
+            found.setdefault(stem, []).append(axis)
+    for stem, axes in found.items():
+        if others := [axis for axis in _PARTS if axis not in axes]:
+            yield f"{stem}.{axes[0]}", ", ".join(others)
 
 
 def _require_names(table: str, names: Iterable[str], without: str = "") -> None:

@@ -233,6 +233,8 @@ def test_metrics_of_ones_own_are_objectives_of_the_base_and_elsewhere_the_error_
         assert f"metrics: no such key; metrics of your own are expressions under {there}" in refused(tmp_path, text)
     for table in ("controllers", "base.controllers"):
         assert 'a vehicle file, vehicle = "FILE.toml"' in refused(tmp_path, f"[{table}.X]\nvelocity_ratio = 1\n{ONE}")
+    with pytest.raises(UsageError, match=r"^design: no such key; the keys of \[design\] are arguments: .*, repeat$"):
+        Study(name="a", base=study.base, axes=study.axes, design={"repeat": 3})  # type: ignore[call-arg]
     taken = refused(tmp_path, f'[base.objectives]\nposition_max = "1"\n{ONE}')
     assert "objectives: position_max: expected another name; this one is taken" in taken
 

@@ -216,9 +216,13 @@ def test_a_share_is_of_all_runs_of_a_part_of_the_axes_or_of_those_chosen() -> No
     across = flights.share(axis=1, where=[True, False, True], confidence=0.99)
     assert np.shape(across.low) == (2,)
     assert (np.asarray(across.value).tolist(), np.asarray(across.low)[1]) == ([1.0, 1.0], wilson(2, 2, 0.99)[0])
+    assert flights.share(axis=["axis_0", 1]) == flights.share()
+    assert np.shape(flights.share(axis="axis_0").low) == (3,)
     wrong: list[tuple[dict[str, Any], str]] = [
         ({"axis": 2}, "axis 2 is out of"), ({"where": [1, 2, 3]}, "no truth"), ({"where": [True] * 4}, "broadcast"),
-        ({"where": False}, "0 of 0"), ({"confidence": 99}, "between 0 and 1"),
+        ({"where": False}, "^share of good: where chooses no run; expected one"),
+        ({"axis": 1, "where": [[True], [False]]}, "chooses no run at 1 of 2 places"),
+        ({"axis": "y"}, "^axis = y: expected one of axis_0, axis_1$"), ({"confidence": 99}, "between 0 and 1"),
     ]  # fmt: skip
     for arguments, message in wrong:
         with pytest.raises(QuadcosimError, match=message):

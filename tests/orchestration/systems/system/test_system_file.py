@@ -182,8 +182,20 @@ def test_a_run_too_short_for_a_component_or_a_message_is_named() -> None:
     components = {"late": law(0.1, offset=0.6), "slow": law(0.5), "fast": law(0.1)}
     sent = [Connection(name=f"m{i}", start=("fast.y",), end=(f"slow.u{i}",), delay=d) for i, d in enumerate((0.7, 0.4))]
     ends = "the run ends at 0.5 s, so"
-    assert [*System(stop_time=0.5, components=components, connections=tuple(sent)).too_short()] == [
+    assert [*System(stop_time=0.5, components=components, connections=tuple(sent)).oversights()] == [
         f"components.late.sampling.offset = 0.6: {ends} late never samples",
         f"components.slow.sampling.period = 0.5: {ends} slow samples only once",
         f"connections.m0.delay = 0.7: {ends} none of its messages arrives",
+    ]
+
+
+def test_a_quaternion_of_which_parts_are_set_is_named() -> None:
+    def body(**parts: float) -> Component:
+        parameters = {f"initial.quaternion.{part}": value for part, value in parts.items()}
+        return Component(fmu="body.fmu", parameters={"initial.position.x": 1.0, **parameters})
+
+    components = {"level": body(w=1.0, x=0.0), "whole": body(x=0.0, y=0.0, z=0.0, w=1.0), "as_it_is": body()}
+    place = "components.level.parameters.initial.quaternion.w"
+    assert [*System(stop_time=0.5, components=components).oversights()] == [
+        f"{place}: is set without y, z, which keep their start values"
     ]
