@@ -192,7 +192,7 @@ def test_a_run_too_short_for_a_component_or_a_message_is_named() -> None:
 def test_a_quaternion_of_which_parts_are_set_is_named() -> None:
     def body(**parts: float) -> Component:
         parameters = {f"initial.quaternion.{part}": value for part, value in parts.items()}
-        return Component(fmu="body.fmu", parameters={"initial.position.x": 1.0, **parameters})
+        return Component(fmu="body.fmu", step=0.01, parameters={"initial.position.x": 1.0, **parameters})
 
     components = {"level": body(w=1.0, x=0.0), "whole": body(x=0.0, y=0.0, z=0.0, w=1.0), "as_it_is": body()}
     place = "components.level.parameters.initial.quaternion.w"
