@@ -107,6 +107,11 @@ class Package:
             raise UsageError(f"source {source}: there is no such file in the SSP")
         return path
 
+    def resource(self, file: str) -> str | None:
+        """The path of a file that the timing of the SSP has in its resources; None: it is another file."""
+        path = self.structure.parent / file
+        return str(path) if Path(file).parts[:1] == ("resources",) and path.is_file() else None
+
 
 def open_package(path: Path) -> Package:
     """The SSP of an .ssp or .ssd file; raises `UsageError` for anything else."""

@@ -13,7 +13,7 @@ from orchestration.foundation.basics.unit_algebra import BaseUnits
 from orchestration.simulation.requests.ssp.document import open_package, read
 from orchestration.simulation.requests.ssp.parameters import Value
 from orchestration.simulation.requests.ssp.structure import Node, Path_, Structure, Wire, dotted, structure_of
-from orchestration.simulation.requests.ssp.timing import expect_tables, from_text
+from orchestration.simulation.requests.ssp.timing import expect_tables, from_text, with_files
 from orchestration.systems.system.component import Parameter
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.conversion import Conversion, OtherQuantity, between
@@ -46,6 +46,7 @@ def tables_of_ssp(path: Path, timing: Mapping[str, Any] | None) -> dict[str, Any
     if timing is None:
         timing = {} if structure.timing is None else from_text(structure.timing)
     expect_tables(timing)
+    timing = with_files(timing, package.resource)
     names = _names(structure.components)
     models = {place: read_model(fmu) for place, fmu in structure.components.items()}
     tables: dict[str, Any] = {**timing}

@@ -1,6 +1,6 @@
 """The file beside an SSP with the timing of a system, which SSP lacks."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +8,12 @@ from fmu_kit.new_files import write_atomically
 from orchestration.foundation.basics.documents import toml_of
 from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.systems.system.file_tables import tables_of
+from orchestration.systems.system.files import input_files
 from orchestration.systems.system.model import System
 
 ENDING = ".timing.toml"
+RESOURCES = "resources/"
+"""The folder of an SSP with its files"""
 ANNOTATION = "quadcosim.timing"
 """The type of the annotation of an SSP with the same content"""
 
@@ -26,7 +29,33 @@ def as_text(system: System, **before: str) -> str:
     """The text of such a file, with other keys first."""
     import tomli_w
 
-    return tomli_w.dumps({**before, **_timing_tables(system)})
+    packed = {str(path.absolute()): place for place, path in files_of(system).items()}
+    return tomli_w.dumps(with_files({**before, **_timing_tables(system)}, packed.get))
+
+
+def files_of(system: System) -> dict[str, Path]:
+    """The files that an SSP has for its timing, tables and traces, by their place in it.
+
+    Raises `UsageError` for different ones of one name.
+    """
+    found: dict[str, Path] = {}
+    for path in input_files(system).values():
+        other = found.setdefault(f"{RESOURCES}{path.name}", path)
+        if other.absolute() != path.absolute():
+            raise UsageError(f"{other} and {path}: expected files of different names")
+    return found
+
+
+def with_files(tables: Any, place: Callable[[str], str | None]) -> Any:
+    """The tables with each `file` at another place, if it has one."""
+    if isinstance(tables, list):
+        return [with_files(each, place) for each in tables]
+    if not isinstance(tables, Mapping):
+        return tables
+    return {
+        key: (place(value) or value) if key == "file" and isinstance(value, str) else with_files(value, place)
+        for key, value in tables.items()
+    }
 
 
 def from_text(text: str) -> dict[str, Any]:

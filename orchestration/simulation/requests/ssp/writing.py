@@ -51,6 +51,8 @@ def write(
         for line in rejections(export):
             warn(request.in_own_terms(line))
     files = {source: fmu.read_bytes() for source, fmu in _sources(export.parts).items()}
+    for place, table in timing.files_of(export.system).items():
+        files[place] = table.read_bytes()
     for part in export.parts:
         files[_parameter_file(part)] = document(_parameter_set({"": part}))
     files[SYSTEM_PARAMETERS] = document(_parameter_set({f"{part.name}.": part for part in export.parts}))
@@ -88,11 +90,11 @@ to"""
 
 
 def _source(part: Part) -> str:
-    return f"resources/{part.fmu.name}"
+    return f"{timing.RESOURCES}{part.fmu.name}"
 
 
 def _parameter_file(part: Part) -> str:
-    return f"resources/{part.name}.ssv"
+    return f"{timing.RESOURCES}{part.name}.ssv"
 
 
 # -- the documents ----------------------------------------------------------------------------------------

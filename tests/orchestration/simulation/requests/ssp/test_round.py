@@ -1,6 +1,7 @@
 """A system written as an SSP with its timing has the same run when it is read again."""
 
 import dataclasses
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from orchestration.simulation.requests.ssp import document, writing
 from orchestration.simulation.runs.result import Result
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.connection import Source
+from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import Criterion, System
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
@@ -80,6 +82,29 @@ def test_without_a_file_the_timing_of_the_annotation_is_used_and_checked(
     document.write_text(document.read_text("utf-8").replace("seed = 7", "seed = = 7"), "utf-8")
     with pytest.raises(UsageError, match=r"annotation quadcosim\.timing: expected TOML"):
         load_request(document)
+
+
+def test_files_of_sources_and_traces_travel_in_the_ssp(tmp_path: Path) -> None:
+    folders = [tmp_path / name for name in ("here", "out", "elsewhere")]
+    for folder in folders:
+        folder.mkdir()
+    here, out, elsewhere = folders
+    (here / "push.csv").write_text("time,u\n0,1\n1,2\n", "utf-8")
+    (here / "late.csv").write_text("value\n0.1\n0.2\n", "utf-8")
+    system = carried("double_integrator")
+    first, second = system.connections
+    system = dataclasses.replace(
+        system,
+        stop_time=1.0,
+        components={**system.components, "other": system.components["plant"]},
+        connections=(first, dataclasses.replace(second, delay=Distribution(file=here / "late.csv", column="value"))),
+        sources={"push": Source(file=here / "push.csv", to=("other.u",), columns=("u",))},
+    )
+    written = writing.write_with_timing(system, out / "loop.ssp")
+    known = bits(run(system))
+    moved = [Path(shutil.move(each, elsewhere)) for each in written]
+    shutil.rmtree(here)
+    assert [bits(run(load_request(moved[0], timing))) for timing in (moved[1], None)] == [known, known]
 
 
 def load_structure(ssp: Path, folder: Path) -> Path:
