@@ -225,12 +225,13 @@ class AdaptedInstance(StepsWithEnd):
         self._set_interval()
 
     def _set_interval(self) -> None:
-        """Tell the FMU the interval of the clock of every sample."""
+        """Tell the FMU the interval of the clock of every sample, and another shift than it declares."""
         base = self.model.ticking[:1]
         if self._intervals is not None and base[0].variability != "constant":
             reference, period, offset = (ctypes.c_uint32 * 1)(base[0].reference), *self._intervals
             self._call("setIntervalDecimal", reference, (ctypes.c_double * 1)(period))
-            self._call("fmi3SetShiftDecimal", self._fmu.component, reference, 1, (ctypes.c_double * 1)(offset))
+            if offset != float(base[0].shift):
+                self._call("fmi3SetShiftDecimal", self._fmu.component, reference, 1, (ctypes.c_double * 1)(offset))
 
     def exit_initialization(self) -> None:
         """As `NativeInstance`, and the first update of its discrete states."""

@@ -209,7 +209,9 @@ int fmi3SetIntervalDecimal(Model *m, const uint32_t *r, size_t n, const double *
     m->period = *interval;
     return m->mode ? 3 : 0;
 }
-int fmi3SetShiftDecimal(Model *m, const uint32_t *r, size_t n, const double *shift) { return m->mode ? 3 : 0; }
+int fmi3SetShiftDecimal(Model *m, const uint32_t *r, size_t n, const double *shift) {
+    return m->mode || !*shift ? 3 : 0; /* that of 0 is declared, and not to be set */
+}
 
 /* -- FMI 2.0 ------------------------------------------------------------------------------------------------------- */
 
