@@ -209,11 +209,33 @@ class Model:
         own = name.removeprefix("parameters.")
         if own in self.variables:
             raise UsageError(f"{place}: expected {place.removesuffix(name)}{own}, without a table of parameters")
+        if count := sum(each.whole == name for each in self.variables.values()):
+            raise UsageError(f"{place}: is an array; expected a list of its {count} values")
         hint = did_you_mean(name, self.variables, most=3) or ";"
         settable = [v.name for v in self.variables.values() if v.causality == "parameter"]
         raise UsageError(
             f"{place}: {self.name} has no such variable{hint} its parameters are {listed(settable, most=20)}"
         )
+
+    def by_elements(self, values: Mapping[str, Any], place: str) -> dict[str, Any]:
+        """Values by name, of each array those of its elements: of a list, or of a text with one beside the other.
+
+        Raises `UsageError`, naming place and array, for another number of them, and for a text that has others.
+        """
+        found = dict[str, Any]()
+        for name, value in values.items():
+            elements = [each.name for each in self.variables.values() if each.whole == name != each.name]
+            if not elements or not isinstance(value, (str, list)):
+                found[name] = value
+                continue
+            cells = list(_cells(value))
+            if len(cells) != len(elements):
+                raise UsageError(f"{place}{name} = {value}: expected {len(elements)} numbers")
+            try:
+                found |= zip(elements, map(_number_in, cells))
+            except ValueError:
+                raise UsageError(f"{place}{name} = {value}: expected numbers") from None
+        return found
 
     def base_units(self, unit: str | None) -> BaseUnits | None:
         """A unit in base units, by the FMU's definitions; None if they do not define it."""
@@ -436,6 +458,21 @@ def _read_model(path: Path, changed: int, size: int) -> Model:
         access=USUAL,
         interface=next(iter(declared_of(description))),
     )
+
+
+def _cells(value: Any) -> Iterator[Any]:
+    """The values of a text, or of a list that may have others."""
+    if not isinstance(value, list):
+        yield from value.split() if isinstance(value, str) else [value]
+        return
+    for each in value:
+        yield from _cells(each) if isinstance(each, list) else [each]
+
+
+def _number_in(cell: Any) -> Any:
+    if not isinstance(cell, str):
+        return cell
+    return int(cell) if cell.lstrip("-").isdecimal() else float(cell)
 
 
 def _of_partitions(description: ModelDescription, variables: Mapping[str, Variable]) -> dict[str, frozenset[str]]:

@@ -73,7 +73,7 @@ def alone(
         sampling=clock,
         tolerance=tolerance,
         record=_recorded(model, record),
-        parameters=_parameters(model, parameters or {}),
+        parameters=model.by_elements(parameters or {}, f"{model.path}: "),
         interface=interface,
         solver=solver,
         start_time=begin or None,
@@ -204,25 +204,6 @@ def _recorded(model: Model, names: Sequence[str]) -> tuple[str, ...] | None:
     for variable in model.variables.values():
         elements.setdefault(variable.whole, []).append(variable.name)
     return tuple(each for name in names for each in elements.get(name, [name])) or None
-
-
-def _parameters(model: Model, given: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    """The values by name; those of an array, in one text as fmpy has them, by its elements."""
-    values = dict[str, Parameter]()
-    for name, value in given.items():
-        elements = [each.name for each in model.variables.values() if each.whole == name != each.name]
-        if not elements or not isinstance(value, str):
-            values[name] = value
-            continue
-        if len(cells := value.split()) != len(elements):
-            raise UsageError(f"{model.path}: {name} = {value}: expected {len(elements)} numbers")
-        try:
-            values |= {
-                each: int(cell) if cell.lstrip("-").isdecimal() else float(cell) for each, cell in zip(elements, cells)
-            }
-        except ValueError:
-            raise UsageError(f"{model.path}: {name} = {value}: expected numbers") from None
-    return values
 
 
 def _sources(model: Model, name: str, inputs: Path, begin: float) -> dict[str, Source]:

@@ -15,7 +15,7 @@ from orchestration.systems.system.computers import Arrivals, Computer, Message, 
 from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import Criterion, System
-from orchestration.systems.system.paths import changed, for_each
+from orchestration.systems.system.paths import by_elements, changed, for_each
 from orchestration.systems.system.requirements import is_number, require
 
 Part = TypeVar("Part")
@@ -124,7 +124,8 @@ def _component(name: str, table: Any, folder: Path, is_task: bool) -> Component:
     place = f"components.{name}"
     keys = table.as_dict(without=("sampling",))
     keys["fmu"] = str(folder / table.fmu) if table.fmu.endswith(PATHS) else table.fmu
-    keys["parameters"] = parameters_in(table.parameters, f"{place}.parameters")
+    given = by_elements(keys["fmu"], dict(flattened(table.parameters)), f"{place}.parameters.")
+    keys["parameters"] = parameters_in(given, f"{place}.parameters")
     of_clock = {}
     if table.partition is not None:
         keys["fmu"] = _with_partitions(keys["fmu"])

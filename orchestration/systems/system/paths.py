@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestration.components.building.models import PATHS
+from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, prefixed
 from orchestration.foundation.basics.records import replaced
 from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
@@ -51,7 +53,7 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
             shared[table][name] = _with_parts(place, shared[table][name], keys)
         else:
             sources[name] = _replaced(
-                place, sources[name], _with_new_kind(sources[name], _by_parameter(sources[name], keys))
+                place, sources[name], _with_new_kind(sources[name], _by_parameter(f"{place}.", sources[name], keys))
             )
     if _only_numbers(system, grouped, top):
         return replaced(system, components=components, connections=tuple(connections.values()), **top)
@@ -254,9 +256,9 @@ def _with_parts(place: str, of: Computer | Network, keys: Mapping[str, Any]) -> 
 
 def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Component:
     if _are_parameters(keys) and all(type(value) is float for value in keys.values()):
-        return replaced(component, **_by_parameter(component, keys))
+        return replaced(component, **_by_parameter(f"{place}.", component, keys))
     sampling = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("sampling.")}
-    rest = {key: value for key, value in _by_parameter(component, keys).items() if "." not in key}
+    rest = {key: value for key, value in _by_parameter(f"{place}.", component, keys).items() if "." not in key}
     if sampling:
         rest["sampling"] = _replaced(f"{place}.sampling", component.sampling, sampling)
     if rest.keys() == {"sampling"} and "fmu_clock" not in sampling:  # nothing else in a component depends on it
@@ -264,10 +266,20 @@ def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Com
     return _replaced(place, component, rest) if rest else component
 
 
-def _by_parameter(of: Component | Source, keys: Mapping[str, Any]) -> dict[str, Any]:
+def by_elements(fmu: str, parameters: Mapping[str, Any], place: str) -> Mapping[str, Any]:
+    """Parameters of a component with those of arrays by their elements, where its FMU is there."""
+    has_arrays = any(isinstance(each, list) or (isinstance(each, str) and " " in each) for each in parameters.values())
+    if not has_arrays or not (fmu.endswith(PATHS[0]) and Path(fmu).is_file()):
+        return parameters
+    return read_model(Path(fmu)).by_elements(parameters, place)
+
+
+def _by_parameter(place: str, of: Component | Source, keys: Mapping[str, Any]) -> dict[str, Any]:
     """Keys such as `parameters.radius` merged into their table."""
     parameters = {key.partition(".")[2]: value for key, value in keys.items() if key.startswith("parameters.")}
     rest = {key: value for key, value in keys.items() if not key.startswith("parameters.")}
+    if isinstance(of, Component):
+        parameters = dict(by_elements(of.fmu, parameters, f"{place}parameters."))
     return {**rest, "parameters": {**rest.get("parameters", of.parameters), **parameters}} if parameters else rest
 
 

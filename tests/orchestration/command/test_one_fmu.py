@@ -9,8 +9,10 @@ from fmpy.util import read_csv, write_csv
 
 from orchestration.command.flags import FlightFlags, request_from
 from orchestration.simulation.engines.batch.shape import Shape
+from orchestration.simulation.engines.resolved import resolve
 from orchestration.simulation.requests.one_fmu import remarks
-from orchestration.simulation.requests.request import load_request
+from orchestration.simulation.requests.request import load_request, request_from_tables
+from orchestration.systems.system.paths import changed
 from quadcosim import UsageError, run
 from tests.commands import Main
 from tests.orchestration.components.fmi.exchange import clock, exchange, law, partitions
@@ -94,6 +96,21 @@ def test_all_commands_set_what_run_sets_and_a_value_that_cannot_be_read_is_named
     refused = main("run", fmu, "--in-process", code=1).stderr
     assert "u = 1 2 3: expected 2 numbers" in main("run", fmu, "--set", "u=1 2 3", code=2).stderr
     assert "fmi3GetInt8: returned fmi3Error, without a message, for lost" in refused
+
+
+@needs_compiler
+@pytest.mark.parametrize("written", ["1 2.5", [1, 2.5]])
+def test_an_array_of_a_component_is_a_list_or_a_text(here: Path, written: object) -> None:
+    component, path = {"fmu": str(small(here, fmi=3)), "step": 0.1}, "components.a.parameters.u"
+    tables = {"stop_time": 1.0, "components": {"a": {**component, "parameters": {"u": written}}}}
+    system = request_from_tables(tables, here).as_system()
+    assert system.components["a"].parameters == {"u[1]": 1, "u[2]": 2.5}
+    plain = request_from_tables({**tables, "components": {"a": component}}, here).as_system()
+    assert changed(plain, {path: written}) == system
+    with pytest.raises(UsageError, match=r"^components\.a\.parameters\.u = \[1\]: expected 2 numbers"):
+        changed(plain, {path: [1]})
+    with pytest.raises(UsageError, match=r"^components\.a\.parameters\.u: is an array; expected a list of its 2"):
+        resolve(changed(plain, {path: 1}))
 
 
 @needs_compiler
