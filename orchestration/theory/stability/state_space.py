@@ -1,6 +1,6 @@
 """A linear system in discrete time, and the controllable and observable part of a larger one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -13,13 +13,13 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
-"""Samples of impulse responses, powers of two apart, as long as they stay small"""
+"""Samples of impulse responses that are tried first, powers of two apart, as long as they stay small"""
 LARGEST_RESPONSE = 1e6
 """Largest response, relative to the first"""
-MINIMAL, ROUNDING = 1e-9, 1e-13
+SHARES = (1e-9, 1e-10, 1e-11, 1e-12, 1e-13)
 """Shares of the largest singular value between inputs and outputs, each by its own unit: larger ones than the first are
-states, smaller ones than the second count as 0; of those in between as many as make the response right"""
-TURNS = np.linspace(0.05, 3.1, 8)
+states, smaller ones than the last count as 0; in between the first that makes the response right"""
+TURNS = np.geomspace(1e-3, 3.1, 24)
 """Frequencies at which it has to be right, in radians per sample"""
 RIGHT = 1e-5
 """Error of the response of an output, relative to its largest at that frequency: what models are measured to"""
@@ -62,36 +62,55 @@ class StateSpace:
 
 
 def reduced(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
-    """The controllable and observable part of a system, in balanced coordinates.
+    """The controllable and observable part of a system, in balanced coordinates; the system where none is right.
 
     By the singular values of the impulse responses (Ho and Kalman), over a finite time and scaled where they grow, so
-    that the system need not be stable.
+    that the system need not be stable: at some samples, and at as many as it has states where these leave out too much,
+    as of a delay over more samples.
     """
     if not (B.any() and C.any()):
         return np.zeros((0, 0)), np.zeros((0, B.shape[1])), np.zeros((C.shape[0], 0))
+    at_turns, impulses = _response(A, B, C), _impulses(A, B, C, 2 * len(A), LARGEST_RESPONSE * np.abs(B).max())
+    for samples in (SAMPLES, range(len(A))):
+        for found in _reductions(A, B, C, samples):
+            early = _impulses(*found, len(impulses))
+            if _is_right(_response(*found), at_turns, axis=2) and _is_right(early, impulses, axis=(0, 2)):
+                return found
+    return A, B, C
+
+
+def _reductions(A: Floats, B: Floats, C: Floats, samples: Sequence[int]) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Reductions by impulse responses at some samples, to more and more states."""
 
     @cache
     def power(k: int) -> Floats:
         """A to a power of two."""
         return A if k == 1 else np.asarray(power(k // 2) @ power(k // 2))
 
-    made, shown = _responses(power, B), _responses(lambda k: power(k).T, C.T)
+    made, shown = _responses(power, B, samples), _responses(lambda k: power(k).T, C.T, samples)
     responses = np.concatenate([abs(C @ state).max(axis=1, keepdims=True) for state in made], axis=1).max(axis=1)
     weight = np.tile(np.where(responses > 0.0, responses, 1.0), len(shown))
     reachable, observable = np.hstack(made), np.hstack(shown).T / weight[:, None]
     (along, shows), (across, makes) = np.linalg.qr(observable), np.linalg.qr(reachable.T)
     left, values, right = np.linalg.svd(shows @ makes.T)  # no larger than A, however many signals and samples
     left, right = along @ left, right @ across.T
-    whole = _response(A, B, C)
-    fewest, most = (int((values > share * values[0]).sum()) for share in (MINIMAL, ROUNDING))
-    for rank in range(fewest, most + 1):
+    for rank in sorted({int((values > share * values[0]).sum()) for share in SHARES}):
         root = np.sqrt(values[:rank])
         back = reachable @ right[:rank].T / root
         onto = (left[:, :rank] / root).T @ observable
-        found = onto @ A @ back, onto @ B, C @ back
-        if (abs(_response(*found) - whole) <= RIGHT * abs(whole).max(axis=2, keepdims=True)).all():
-            break
-    return found
+        yield onto @ A @ back, onto @ B, C @ back
+
+
+def _is_right(found: Any, whole: Any, axis: int | tuple[int, ...]) -> bool:
+    return bool((abs(found - whole) <= RIGHT * abs(whole).max(axis=axis, keepdims=True)).all())
+
+
+def _impulses(A: Floats, B: Floats, C: Floats, count: int, largest: float = np.inf) -> Floats:
+    """The first outputs after an impulse on each input, shape (n, outputs, inputs); n ends before large states."""
+    found, state = [C @ B], B
+    while len(found) < count and np.abs(state := A @ state).max() <= largest:
+        found.append(C @ state)
+    return np.array(found)
 
 
 def _response(A: Floats, B: Floats, C: Floats) -> Any:
@@ -100,11 +119,11 @@ def _response(A: Floats, B: Floats, C: Floats) -> Any:
     return C @ np.linalg.solve(z * np.eye(len(A)) - A, B.astype(complex)[None])
 
 
-def _responses(power: Callable[[int], Floats], B: Floats) -> list[Floats]:
-    """A^k B for k in `SAMPLES`, each column no larger than that of B: growth would hide all else behind rounding."""
+def _responses(power: Callable[[int], Floats], B: Floats, samples: Sequence[int]) -> list[Floats]:
+    """A^k B for k in `samples`, each column no larger than that of B: growth would hide all else behind rounding."""
     found, state = [B], B
     largest = np.maximum(np.abs(B).max(axis=0), np.finfo(float).tiny)
-    for before, sample in pairwise(SAMPLES):
+    for before, sample in pairwise(samples):
         state = power(sample - before) @ state
         if not np.abs(state).max() <= LARGEST_RESPONSE * np.abs(B).max():
             break

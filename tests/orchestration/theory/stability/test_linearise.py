@@ -114,6 +114,20 @@ def test_a_fast_state_beside_a_growing_one_is_left_out_only_if_the_response_stay
         assert len(reduced(A, B, np.array([[1.0, -2.0, 1.0, share]]))[0]) == states
 
 
+def test_a_delay_over_more_samples_than_are_tried_first_keeps_all_its_states() -> None:
+    """A slow, badly damped plant behind a delay of 70 samples: no fewer states have its impulse response."""
+    late = 70
+    A = np.diag(np.ones(late + 1), -1)
+    A[late:, late:] = [[1.0, 0.01], [-0.02, 0.98]]
+    A[late, late - 1], A[late + 1, late - 1] = 0.0, 0.01
+    B, C = np.eye(late + 2)[:, :1], np.eye(late + 2)[late : late + 1]
+    responses = []
+    for a, b, c in ((A, B, C), reduced(A, B, C)):
+        assert len(a) == late + 2
+        responses.append([(c @ np.linalg.matrix_power(a, k) @ b).item() for k in (late, late + 2, 100, 500)])
+    assert responses[1] == pytest.approx(responses[0], rel=1e-8, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("name", "component", "expected"),
     [
