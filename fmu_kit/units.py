@@ -3,12 +3,9 @@
 A name is a product of symbols with whole exponents, divided by one symbol or by a product in parentheses.
 """
 
-import functools
-import json
 import math
 import re
 from collections.abc import Mapping
-from pathlib import Path
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 """Base units by their names in FMI, in its order."""
@@ -32,16 +29,46 @@ SYMBOLS: dict[str, dict[str, int]] = {
 }
 """Symbols whose unit is a product of base units without a factor."""
 
+QUANTITIES = {
+    "m": "Length",
+    "m/s": "Velocity",
+    "m/s2": "Acceleration",
+    "m/s3": "Jerk",
+    "rad": "Angle",
+    "rad/s": "AngularVelocity",
+    "rad/s2": "AngularAcceleration",
+    "kg": "Mass",
+    "kg.m2": "MomentOfInertia",
+    "kg/m3": "Density",
+    "N": "Force",
+    "N.m": "Torque",
+    "s": "Time",
+    "Hz": "Frequency",
+    "m2": "Area",
+    "m3": "Volume",
+    "m3/s": "VolumeFlowRate",
+    "kg/s": "MassFlowRate",
+    "Pa": "Pressure",
+    "J": "Energy",
+    "W": "Power",
+    "K": "ThermodynamicTemperature",
+    "A": "ElectricCurrent",
+    "V": "ElectricPotential",
+    "C": "ElectricCharge",
+    "Ohm": "Resistance",
+    "S": "Conductance",
+    "F": "Capacitance",
+    "H": "Inductance",
+    "Wb": "MagneticFlux",
+    "T": "MagneticFluxDensity",
+    "mol": "AmountOfSubstance",
+    "cd": "LuminousIntensity",
+}
+"""The quantity of a unit if none is given, by its name in `Modelica.Units.SI`."""
+
 _DEGREES = math.degrees(1.0)
 DISPLAYED = {"rad": ("deg", _DEGREES), "rad/s": ("deg/s", _DEGREES), "rad/s2": ("deg/s2", _DEGREES)}
 """The display unit of a unit, and its factor: how many of it make one of that unit."""
-
-
-@functools.cache
-def quantities() -> dict[str, str]:
-    """The quantity of each unit if none is given, by its name in `Modelica.Units.SI`; where FMUs are built."""
-    found: dict[str, str] = json.loads(Path(__file__).with_name("quantities.json").read_text(encoding="utf-8"))
-    return found
 
 
 def factors(name: str) -> dict[str, int]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from fmu_kit.errors import FmuError, require
-from fmu_kit.units import DISPLAYED, quantities
+from fmu_kit.units import DISPLAYED, QUANTITIES
 
 Causality = Literal["input", "output", "parameter", "local"]
 Variability = Literal["continuous", "discrete", "fixed", "tunable", "constant"]
@@ -68,7 +68,7 @@ class Variable:
     @property
     def quantity(self) -> str | None:
         """The quantity, as named or as follows from the unit; None if unknown."""
-        return self.named_quantity or quantities().get(self.unit or "")
+        return self.named_quantity or QUANTITIES.get(self.unit or "")
 
     @property
     def displayed_in(self) -> str | None:
