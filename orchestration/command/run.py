@@ -14,7 +14,7 @@ from orchestration.command.registry import CommandResult, expect_positive, optio
 from orchestration.command.study_flags import TimeLimit
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import inform, progress_bar, warn
-from orchestration.foundation.basics.unit_algebra import after
+from orchestration.foundation.basics.unit_algebra import after, some
 from orchestration.foundation.processes.resource_limits import Limits
 
 if TYPE_CHECKING:
@@ -99,6 +99,8 @@ def run(
         inform(f"loop {loop}")
     for where in result.provenance.get("events", ()):
         inform(f"events of {where}")
+    if unseen := _events_between_rows(result):
+        inform(unseen)
     if fmu is not None:
         one_fmu.write(fmu, result)
     if out is not None:
@@ -136,6 +138,27 @@ def _resumed(paused_in: Path, out: Path | None, figures: bool, how: Any) -> "Res
     from orchestration.simulation.runs import pause
 
     return pause.resume(paused_in, out, figures=figures, **how)
+
+
+def _events_between_rows(result: "Result") -> str | None:
+    """A note about events within steps of components whose signals objectives use; None if there are none."""
+    import numpy as np  # not needed for --help
+
+    from orchestration.foundation.basics.times import instants_of
+    from orchestration.systems.expressions.syntax import names, parse
+
+    used = {name for text in result.system.objectives.values() for name in names(parse(text))}
+    counts = dict[str, int]()
+    for chunk in result.recording.chunks(("time",)):
+        events, rows = chunk.events, instants_of(chunk.rows[:, 0])
+        for what in events.names:
+            of = events.table[events.are("event", what), 0]
+            if any(each.startswith(f"{what}.") for each in used):
+                counts[what] = counts.get(what, 0) + int((~np.isin(of, rows)).sum())
+    texts = [f"{count} events within steps of {what}" for what, count in counts.items() if count]
+    if not texts:
+        return None
+    return f"{some(texts)}: objectives are of the rows; a shorter step brings them nearer"
 
 
 def _metrics(result: "Result") -> CommandResult:

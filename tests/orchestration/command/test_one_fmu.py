@@ -362,3 +362,13 @@ def test_an_fmu_is_called_at_its_own_time_by_both_loops_and_its_events_are_at_th
         assert [event.time for event in result.events] == [k * 10**9 + 5 * 10**8 for k in range(4)]
     with pytest.raises(UsageError, match=r"components.it.start_time = 0.5: expected 0 for one of many at once"):
         Shape(system=result.system, models={}, lanes=1)
+
+
+@needs_compiler
+def test_objectives_of_a_component_with_events_within_steps_are_told_to_be_of_the_rows(main: Main, here: Path) -> None:
+    file, fmu = here / "ball.toml", known(exchange(here, "ball"))
+    text = f'stop_time = 2.0\n[components.b]\nfmu = "{fmu.name}"\nstep = 0.5\n[objectives]\nn = '
+    note = "events within steps of b: objectives are of the rows; a shorter step brings them nearer"
+    for objective, is_told in (("max(b.x1)", True), ("max(time)", False)):
+        file.write_text(f'{text}"{objective}"\n', "utf-8")
+        assert (note in main("run", file, "--in-process").stderr) is is_told
