@@ -17,6 +17,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import SHARED
 
 TOP = ("stop_time", "seed")
+_IN_FILE_ONLY = "is set in the file only"
 _COMPONENTS, _PARAMETERS = "components.", ".parameters."
 
 
@@ -154,6 +155,8 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
     }
     if table not in tables:
         listed = f"{', '.join(TOP)} or one that begins with {', '.join(tables)}"
+        if table in ("order", *(f.name for f in dataclasses.fields(System))):
+            raise UsageError(f"{path}: {_IN_FILE_ONLY}; expected {listed}")
         raise UsageError(f"{path}: no such path; expected {listed}{did_you_mean(table, [*TOP, *tables])}")
     known = list(tables[table])
     names = [name for name in known if rest.startswith(f"{name}.")]
@@ -186,6 +189,10 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         known = key in keys[:-1]
     if not known:
         listed = f"{table}.{name}. and one of {', '.join(keys)}"
+        kind = {"components": Component, "connections": Connection}.get(table)
+        of_files = [] if kind is None else [_IN_FILES.get(f.name, f.name) for f in dataclasses.fields(kind)]
+        if key in of_files and key != "step":  # which none has beside sampling
+            raise UsageError(f"{path}: {_IN_FILE_ONLY}; expected {listed}")
         raise UsageError(f"{path}: no such key; expected {listed}{did_you_mean(key, keys)}")
 
 
