@@ -100,10 +100,9 @@ def export(
     what: Annotated[Path, typer.Argument(help="Study file, or the directory of a run.", metavar="STUDY.toml|DIR")],
     out: Annotated[
         Path | None,
-        option(
-            "--out", "Folder of the study's store, default: results/NAME; of a run, of the files, default: DIR.", "DIR"
-        ),
+        option("--out", "Folder of the files; default: that of the store, or of the run.", "DIR"),
     ] = None,
+    store: Annotated[Path | None, STORE] = None,
     formats: Annotated[
         list[str] | None,
         option("--format", "Default: parquet and csv of a study, csv of a run; may be repeated.", "csv|mat|parquet"),
@@ -112,26 +111,29 @@ def export(
     metric: Annotated[str | None, option("--metric", "Metric whose medians in the cells are written too.")] = None,
 ) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
-    from orchestration.experiments.studies.store import store_path
+    from orchestration.experiments.studies.store import store_folder, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.table import of_run, of_study
 
     printed_tables.expect_format(table)
     if what.is_dir() and (table, metric) != (None, None):
         raise UsageError(f"{what}: expected a study file with --table and --metric")
+    if what.is_dir() and store is not None:
+        raise UsageError(f"{what}: expected a study file with --store")
     if what.is_dir() and not store_path("", what).is_file():
         return result_of_files(of_run(what, out or what, formats or ()))
     if what.is_dir():
-        return result_of_files(of_study(store_path("", what), formats or ()))
-    store, study = _current_store(what, out), load_study(what)
+        return result_of_files(of_study(store_path("", what), formats or (), out=out))
+    study = load_study(what)
+    path = _current_store(what, store_folder(study.name, store, out))
     if table is None:
-        return result_of_files(of_study(store, formats or (), study, metric))
+        return result_of_files(of_study(path, formats or (), study, metric, out=out))
     from orchestration.command.study_table import study_table
 
-    printed = study_table(study, store, metric)
-    written = of_study(store, formats or (), study, metric)
-    for path in written:
-        inform(str(path))  # standard output is the table alone, for a file
+    printed = study_table(study, path, metric)
+    written = of_study(path, formats or (), study, metric, out=out)
+    for file in written:
+        inform(str(file))  # standard output is the table alone, for a file
     lines = list(printed_tables.lines(printed, table))
     return CommandResult(document=result_of_files(written).document, lines=lines)
 

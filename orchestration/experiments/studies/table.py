@@ -193,8 +193,15 @@ def of_run(folder: Path, out: Path, formats: Sequence[str]) -> list[Path]:
     return [*written, *([result.to_mat(out / MAT)] if "mat" in formats else [])]
 
 
-def of_study(store: Path, formats: Sequence[str], study: Study | None = None, metric: str | None = None) -> list[Path]:
-    """Write the rows of a store beside it, default: as Parquet and CSV; the paths.
+def of_study(
+    store: Path,
+    formats: Sequence[str],
+    study: Study | None = None,
+    metric: str | None = None,
+    *,
+    out: Path | None = None,
+) -> list[Path]:
+    """Write the rows of a store to `out`, default: beside it, and as Parquet and CSV; the paths.
 
     Of a `study` with cells also the share of good runs of each, and the median of a `metric`, with intervals.
     """
@@ -202,7 +209,7 @@ def of_study(store: Path, formats: Sequence[str], study: Study | None = None, me
         _expect(kind, FORMATS)
     if metric is not None:
         expect_medians(study, metric)
-    return export(store, store.parent, formats or FORMATS[:2], study, metric=metric)
+    return export(store, out or store.parent, formats or FORMATS[:2], study, metric=metric)
 
 
 def expect_medians(study: Study | None, metric: str) -> None:

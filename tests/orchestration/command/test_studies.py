@@ -67,6 +67,8 @@ def test_a_study_is_run_inspected_and_exported(flown: Path, swept: tuple[Path, D
     parquet = pd.read_parquet(flown / exported[0])
     assert parquet["period"].tolist() == [0.02] * 3 + [0.01] * 3
     assert len(pd.read_csv(flown / exported[1])) == 6
+    placed = main("export", "study.toml", "--store", STORE.parent, "--out", "there", "--format", "csv").stdout
+    assert placed == f"{Path('there', 'runs.csv')}\n"
 
 
 def test_a_store_goes_to_the_given_folder_and_figures_beside_it(folder: Path, main: Main) -> None:
