@@ -11,7 +11,7 @@ from typing import Any
 _SIGNALS = ("SIGSEGV", "SIGFPE", "SIGILL", "SIGTRAP")
 _TRAPS = (signal.SIGILL, getattr(signal, "SIGTRAP", None))
 _OF_CHECKS = " (index, overflow, division, shift or conversion that C leaves undefined)"
-"""What may have been checked where code with checks ends itself: the signal does not tell which"""
+"""Checks that may have failed where code with checks ends itself: the signal does not tell which"""
 _WITH_CONTEXT = 4
 """SA_SIGINFO of signal.h"""
 _COUNTER = {"x86_64": 168, "aarch64": 440}

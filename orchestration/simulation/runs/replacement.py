@@ -37,7 +37,7 @@ class Replacement:
     commanded: tuple[str, ...]
     """its outputs that are connected"""
     initial: Floats | None
-    """what stands for these before the first command, if the caller says so"""
+    """their values before the first command, if the caller says so"""
 
     def initial_command(self, system: System, parameters: Mapping[str, Any]) -> Sequence[Any]:
         """What stands for each output before the first command: by default it leaves the inputs as they start.

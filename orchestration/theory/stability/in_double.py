@@ -35,7 +35,7 @@ RESOLVED = 1000.0
 _OF: dict[str, str] = {}
 """The FMU as it is, of each in double precision that this process has taken"""
 _SAME: set[str] = set()
-"""What has been compared"""
+"""Components and their inputs at rest that have been compared"""
 
 
 def in_double(request: fmus.Twin) -> fmus.Twin:
