@@ -15,7 +15,7 @@ from orchestration.systems.system.computers import Arrivals, Computer, Message, 
 from orchestration.systems.system.connection import Connection, Source
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import Criterion, System
-from orchestration.systems.system.paths import by_elements, changed, for_each
+from orchestration.systems.system.paths import at_operating_point, by_elements, for_each
 from orchestration.systems.system.requirements import is_number, require
 
 Part = TypeVar("Part")
@@ -116,7 +116,7 @@ def system_from_tables(tables: Mapping[str, Any], folder: Path) -> System:
         known = ", ".join(system.objectives) or "no objectives"
         require(name in system.objectives, "optional", name, f"one of {known}")
     with prefixed("operating_point: "):
-        changed(system, system.operating_point)
+        at_operating_point(system)
     return system
 
 

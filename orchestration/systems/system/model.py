@@ -24,10 +24,12 @@ from orchestration.systems.system.placement import (
     placed_tasks,
     with_tasks,
 )
-from orchestration.systems.system.requirements import require, require_positive
+from orchestration.systems.system.requirements import is_finite, require, require_positive
 
 DIVERGED, TERMINATED = "diverged", "terminated"
 """Outcomes whatever the criterion is: the run left the region of validity, or an FMU ended it"""
+AFTER = "after"
+"""Key of an operating point beside its paths"""
 
 
 @record()
@@ -78,8 +80,8 @@ class System:
     """The random streams that have a number instead of a name, as `connections.NAME.CAUSE` and
     `components.NAME.jitter`."""
     operating_point: Mapping[str, Any] = field(default_factory=dict)
-    """Changes, by path, with which the system rests: where the local limit is computed. It is checked when it is
-    used."""
+    """Changes, by path, with which the system rests: where loops are linearised. With `after`, the time [s] that it
+    runs with them before it is taken to rest; default: none. That it rests is checked when it is used."""
 
     def __repr__(self) -> str:
         named = {
@@ -211,6 +213,9 @@ class System:
         _require_names("connections", (x.name for x in self.connections))
         _require_names("objectives", self.objectives)
         causes = self._causes()
+        after = self.operating_point.get(AFTER, 0.0)
+        valid = is_finite(after) and after >= 0.0
+        require(valid, f"operating_point.{AFTER}", after, "a time of zero or more seconds")
         for place, number in self.streams.items():
             require(place in causes, "streams", place, f"one of {', '.join(causes) or 'none'}")
             require(number >= 0, f"streams.{place}", number, "a number from 0 on")

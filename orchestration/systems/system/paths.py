@@ -13,10 +13,11 @@ from orchestration.systems.system.component import Component, Sampling, Sampling
 from orchestration.systems.system.computers import Arrivals, Computer, Network
 from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.distribution import parsed_fields
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import AFTER, System
 from orchestration.systems.system.placement import SHARED
 
-TOP = ("stop_time", "seed")
+OF_REST = f"operating_point.{AFTER}"
+TOP = ("stop_time", "seed", OF_REST)
 _IN_FILE_ONLY = "is set in the file only"
 _COMPONENTS, _PARAMETERS = "components.", ".parameters."
 
@@ -36,6 +37,9 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
     for path, given in changes.items():
         value = _converted(path, given)
         table, _, rest = path.partition(".")
+        if path == OF_REST:
+            top["operating_point"] = {**system.operating_point, AFTER: value}
+            continue
         if path in TOP:
             top[path] = value
             continue
@@ -64,6 +68,11 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
         {**top, "components": components, "connections": tuple(connections.values()), "sources": sources, **shared},
     )
     return result
+
+
+def at_operating_point(system: System) -> System:
+    """The system with the values of its operating point; raises `UsageError` as `changed`."""
+    return changed(system, {path: value for path, value in system.operating_point.items() if path != AFTER})
 
 
 def _only_numbers(system: System, grouped: Mapping[tuple[str, str], Mapping[str, Any]], top: Mapping[str, Any]) -> bool:
@@ -123,6 +132,8 @@ def _converted(path: str, value: Any) -> Any:
 
 def value_at(system: System, path: str) -> Any:
     """The value at a path, None where it is not set; raises `UsageError` as `changed` does."""
+    if path == OF_REST:
+        return system.operating_point.get(AFTER)
     if path in TOP:
         return getattr(system, path)
     table, _, rest = path.partition(".")

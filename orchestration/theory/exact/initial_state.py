@@ -14,12 +14,12 @@ from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.resolved import never_computed
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.connection import component_of, variable_of
-from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed, parameter_name
+from orchestration.systems.system.model import AFTER, System
+from orchestration.systems.system.paths import at_operating_point, changed, parameter_name
 from orchestration.theory.stability.linearised_component import LINEAR, Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest, tracing_loader
 from orchestration.theory.stability.matrices import Components
-from orchestration.theory.stability.operating_point import deterministic, exchanged_signals
+from orchestration.theory.stability.operating_point import deterministic, exchanged_signals, time_to_rest
 
 SMALLER = 0.1
 """Factor of a deviation from one in which coordinates are measured to the next"""
@@ -57,6 +57,11 @@ def initial_state_of(
     Runs from it and from half of it, to the `stop_time`, show how linear the loop is. Raises `UsageError` where that
     is too little, naming the share of the deviation from which it is linear enough.
     """
+    if time_to_rest(system):
+        raise UsageError(
+            f"operating_point.{AFTER}: over a horizon initial values count by how far they are from those at rest: "
+            f"expected these in [operating_point], without {AFTER}"
+        )
     _expect_same_sources(system)
     calm = deterministic(replace(system, operating_point={}))
     prompt = {
@@ -192,7 +197,7 @@ def _outputs(instance: Instance, names: tuple[str, ...]) -> Floats:
 
 def _expect_same_sources(system: System) -> None:
     """Raise `UsageError` for a source that drives the system away from rest."""
-    at_rest = changed(system, system.operating_point)
+    at_rest = at_operating_point(system)
     for name, source in system.sources.items():
         if not source.is_held or source.constant != at_rest.sources[name].constant:
             raise UsageError(

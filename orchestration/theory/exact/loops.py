@@ -21,7 +21,7 @@ from orchestration.systems.system.component import Sampling, has_scheduled_insta
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.file_tables import tables_of
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed
+from orchestration.systems.system.paths import at_operating_point
 from orchestration.theory.exact.as_simulated import SimulatedEffects, expect_rows
 from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
@@ -145,7 +145,7 @@ class Loops:
 
     def radius(self, system: System, *, agree: float) -> float:
         """The mean-square radius alone, as `solve` has it."""
-        system = changed(system, system.operating_point)
+        system = at_operating_point(system)
         linear = self.linear(system)
 
         def answer(chain: TimingChain) -> tuple[float, Floats]:
@@ -157,7 +157,7 @@ class Loops:
 
     def solve(self, system: System) -> Solution:
         """Solve a system by finer and finer rules, until they agree; raises `UsageError` where it is too large."""
-        system = changed(system, system.operating_point)
+        system = at_operating_point(system)
         linear = self.linear(system)
         used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q)]
 
@@ -174,7 +174,7 @@ class Loops:
 
     def solve_to(self, system: System, horizon: float) -> Converged[Mapping[Call, float]]:
         """The means of a system from its initial state to `horizon` [s], as `solve`."""
-        rests = changed(system, system.operating_point)
+        rests = at_operating_point(system)
         linear = self.linear(rests, initial=replace(system, stop_time=horizon))
         used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q) or np.any(mean.g)]
         effects = self._effects(rests, linear, used, with_means=True)

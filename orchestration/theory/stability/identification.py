@@ -26,6 +26,8 @@ LONGEST_STEP = 64.0
 """Steps that make a ladder, in periods, at most"""
 SAMPLES = 32
 """Samples of the ladder of a sampled component"""
+LONGER = 4
+"""Factor on it where it does not show a slow state precisely"""
 FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""
 SHRUNK = (1.0, 0.3, 0.1)
@@ -113,7 +115,17 @@ def _tangent(excitation: Excitation, sample: Rung, count: int, samples: int = 1)
     if not found:
         raise refused[0]
     best = min(found, key=lambda one: one.accuracy)
-    best.prove_held(sample.h, samples)
+    try:
+        best.prove_held(sample.h, samples)
+    except UsageError:  # away from zero outputs are rounded: over a longer time a slow integral stands out
+        longer = copy(excitation)
+        if (
+            samples > 1
+            or len(ladder) > SAMPLES
+            or (more := _choose_pulse(longer, [sample] * (LONGER * count))) <= count
+        ):
+            raise
+        return _tangent(longer, sample, more)
     return best
 
 

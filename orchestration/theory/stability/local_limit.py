@@ -17,7 +17,7 @@ from orchestration.systems.system.model import System
 from orchestration.theory.stability.excitation import ImpreciseError
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
-from orchestration.theory.stability.loop_at_rest import KnownTangents
+from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
     NotAnEquilibriumError,
@@ -100,7 +100,7 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
 
 def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LinearLimit:
     """Its accuracy includes the effect of another pulse size."""
-    growths, known = dict[float, float](), KnownTangents()
+    growths, known = dict[float, float](), _known_at_own(at, span, instances)
 
     def growth(value: float) -> float:
         growths[value] = found = growth_of_loop(at(value), instances, known=known)
@@ -124,13 +124,14 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
     Rounding grows and decays as rounding does, whatever the limit: two pulses of about one size have to agree, too.
     """
     with closing(Instances()) as instances:
-        found = _first_growth(partial(_rate, at, instances, 1.0), span, TWINS_TOLERANCE, TWINS)
+        known = _known_at_own(at, span, instances)
+        found = _first_growth(partial(_rate, at, instances, known, 1.0), span, TWINS_TOLERANCE, TWINS)
         if found.limit is None:
             return found
         near = _near(found.limit, span)
-        first, alike = ([_rate(at, instances, size, value) for value in near] for size in (1.0, DITHERED))
+        first, alike = ([_rate(at, instances, known, size, value) for value in near] for size in (1.0, DITHERED))
         if max(abs(a - b) for a, b in zip(first, alike)) <= AGREE * abs(first[1] - first[0]) and all(
-            [_rate(at, instances, OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
+            [_rate(at, instances, known, OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
             for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))
             if end is not None
         ):
@@ -145,8 +146,18 @@ def _near(end: float, span: Range) -> tuple[float, float]:
     return max(min(span.values()), (1.0 - NEAR) * end), min(span.last, (1.0 + NEAR) * end)
 
 
-def _rate(at: Callable[[float], System], instances: Instances, factor: float, value: float) -> float:
-    return growth_of(at(value), instances, factor).rate
+def _rate(
+    at: Callable[[float], System], instances: Instances, known: KnownTangents, factor: float, value: float
+) -> float:
+    return growth_of(at(value), instances, factor, known).rate
+
+
+def _known_at_own(at: Callable[[float], System], span: Range, instances: Instances) -> KnownTangents:
+    """Where the system itself comes to rest, if it runs to rest: of an unstable one the search may find where."""
+    known = KnownTangents()
+    with suppress(UsageError):
+        keep_start(at(span.first if span.own is None else span.own), instances, known)
+    return known
 
 
 def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | None:

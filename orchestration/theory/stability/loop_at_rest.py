@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -23,7 +23,7 @@ from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.engines.algebraic_loops import in_words
 from orchestration.simulation.engines.resolved import resolve_with_models
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
@@ -41,6 +41,8 @@ from orchestration.theory.stability.operating_point import (
     hyperperiod,
     hyperperiod_of,
     latest_offset,
+    longest_period,
+    time_to_rest,
 )
 
 SETTLED = 6
@@ -65,8 +67,38 @@ NO_SIGNALS = ExtraSignals()
 
 
 AnyTangent = Tangent | LiftedTangent
-KnownTangents = dict[str, tuple[Component, Fraction, AnyTangent]]
-"""Tangents by the name of the component, with what it was, and the period that the ladder is for"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where a system has come to rest: there others begin that differ from it in timing."""
+
+    components: Mapping[str, Component]
+    saved: Mapping[str, tuple[bytes, float]]
+    """Saved states of the components, and the times of their next steps by their own clocks [s]"""
+    ticking: frozenset[str]
+    """Components with clocks of FMI 3.0"""
+
+    def serves(self, system: System) -> bool:
+        """Whether the components of another system can begin there: their states hold parameters, and clocks."""
+        return self._untimed(self.components) == self._untimed(system.components)
+
+    def _untimed(self, components: Mapping[str, Component]) -> dict[str, Component]:
+        return {name: one if name in self.ticking else _untimed(one) for name, one in components.items()}
+
+
+def _untimed(one: Component) -> Component:
+    if one.sampling is None:
+        return replace(one, step=1.0)
+    sampling = Sampling(period=1.0, fmu_clock=one.sampling.fmu_clock, offset=one.sampling.offset)
+    return replace(one, sampling=sampling)
+
+
+class KnownTangents(dict[str, tuple[Component, Fraction, AnyTangent]]):
+    """Tangents by the name of the component, with what it was, and the period that the ladder is for."""
+
+    start: Start | None = None
+    """The state in which the last system that runs to rest has come to rest"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,7 +202,8 @@ def at_rest(
     rest there, or has no linear loop, saying why.
     """
     calm = deterministic(system)
-    with _settled(calm, _expect_period(calm), instances, extra, models, {} if known is None else known) as loop:
+    known = KnownTangents() if known is None else known
+    with _settled(calm, _expect_period(calm), instances, extra, models, known) as loop:
         yield loop
 
 
@@ -185,7 +218,7 @@ def whole_at_rest(
 
     Their tangents are measured where they rest over that period, once.
     """
-    calm, known = deterministic(system), {} if known is None else known
+    calm, known = deterministic(system), KnownTangents() if known is None else known
     seen = {name: samples_of(one) for name, (_, _, one) in known.items() if name in calm.components}
     period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
     with _settled(calm, period, instances, NO_SIGNALS, models, known) as loop:
@@ -207,22 +240,62 @@ def _settled(
     models: Mapping[str, Model] | None,
     known: KnownTangents,
 ) -> Iterator[AtRest]:
-    """A system that has come to rest over some periods."""
-    begin = begin_of(calm, period)
+    """A system that has come to rest over some periods: from where one has that differs in timing, or by a run."""
+    kept = known.start if time_to_rest(calm) and known.start is not None and known.start.serves(calm) else None
+    with ExitStack() as stack:
+        try:
+            simulation = stack.enter_context(_rested(calm, period, instances, models, kept))
+        except NotAnEquilibriumError:
+            if kept is None:
+                raise
+            simulation = stack.enter_context(_rested(calm, period, instances, models, None))
+            kept = None
+        saved = {name: one.save() for name, one in simulation.instances.items()}
+        if time_to_rest(calm) and kept is None:
+            times = {name: cast("TracedInstance", one).time for name, one in simulation.instances.items()}
+            known.start = Start(
+                components=calm.components,
+                saved={name: (state, times[name]) for name, state in saved.items()},
+                ticking=frozenset(name for name, one in simulation.instances.items() if one.model.ticking),
+            )
+        yield AtRest(simulation=simulation, saved_states=saved, extra=extra, period=period, known=known)
+
+
+def keep_start(system: System, instances: Instances, known: KnownTangents) -> None:
+    """Keep in `known` where a system comes to rest that has a time to run to rest; raises `UsageError`."""
+    calm = deterministic(system)
+    start_of(calm, hyperperiod_of(calm) or longest_period(calm), instances, known)
+
+
+def start_of(calm: System, period: Fraction, instances: Instances, known: KnownTangents) -> Start | None:
+    """Where a system comes to rest that has a time to run to rest, kept in `known`; None: it begins at rest."""
+    if not time_to_rest(calm):
+        return None
+    if known.start is None or not known.start.serves(calm):
+        expect_whole_instances(calm)
+        with _settled(calm, period, instances, NO_SIGNALS, None, known):
+            pass
+    return known.start
+
+
+@contextmanager
+def _rested(
+    calm: System, period: Fraction, instances: Instances, models: Mapping[str, Model] | None, start: Start | None
+) -> Iterator[PreparedRun]:
+    """A run that has come to rest: begun there, or after the time that it runs to rest."""
+    before = Fraction(0) if start is not None else exact_nanoseconds(time_to_rest(calm))
+    begin = begin_of(calm, period) + math.ceil(before / period) * period
     calm = replace(calm, stop_time=float(begin + (SETTLED + 2) * period) / NANOSECONDS)
     doubled = {name: read_model(calm.components[name].fmu) for name in are_in_double(calm.components)}
     resolved = None if models is None else resolve_with_models(calm, {**models, **doubled})
-    with prepared(calm, load=tracing_loader(instances), resolved=resolved) as simulation:
+    with prepared(calm, load=tracing_loader(instances, start), resolved=resolved) as simulation:
         _expect_states(simulation)
         _expect_open_instants(simulation)
         try:
             _settle(simulation, begin, period)
         finally:  # also where it does not rest, as another law need not
             expect_same_law(calm, instances, written_in(simulation))
-        yield AtRest(
-            simulation=simulation, saved_states={name: one.save() for name, one in simulation.instances.items()},
-            extra=extra, period=period, known=known,
-        )  # fmt: skip
+        yield simulation
 
 
 def begin_of(calm: System, period: Fraction) -> Fraction:
@@ -296,20 +369,33 @@ def _expect_open_instants(simulation: PreparedRun) -> None:
 
 
 def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
-    """Run for some periods, in which no exchanged signal may change."""
+    """Run for some periods from `begin` on [ns], in which no exchanged signal may change."""
     master, system = simulation.master, simulation.system
     master.initialise()
-    rows = []
-    for k in range(SETTLED):
-        if master.run(pause_at=round(begin + k * period)):
-            why = master.divergence or master.running.termination or "it was interrupted"
-            raise UsageError(f"the run leaves the operating point: {why}")
-        rows.append([master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)])
-    end = float(begin + (SETTLED - 1) * period) / NANOSECONDS
+    exchanged, after = [master.board.place[signal] for signal in exchanged_signals(system)], time_to_rest(system)
+
+    def rows_from(begin: Fraction) -> Floats:
+        rows = []
+        for k in range(SETTLED):
+            if master.run(pause_at=round(begin + k * period)):
+                why = master.divergence or master.running.termination or "it was interrupted"
+                hint = (
+                    f": expected values in [operating_point] from which it comes to rest in {after:g} s"
+                    if after
+                    else ""
+                )
+                raise UsageError(f"the run leaves the operating point: {why}{hint}")
+            rows.append(master.board.row[exchanged])
+        return np.array(rows)
+
+    half = begin_of(system, period) + math.ceil(exact_nanoseconds(after) / 2 / period) * period
+    before = rows_from(half) if half + SETTLED * period <= begin else master.board.row[exchanged][None].copy()
+    calm = rows_from(begin)
+    start, end = (float(begin + k * period) / NANOSECONDS for k in (-1, SETTLED - 1))
     try:
-        expect_rest(system, np.array(rows))
+        expect_rest(system, calm, before)
     except NotAnEquilibriumError as error:
-        for signal, change in _changes_of_sources(simulation, end):
+        for signal, change in _changes_of_sources(simulation, start if after else 0.0, end):
             raise NotAnEquilibriumError(
                 f"the operating point is not at rest: source {signal} changes after {quantity(change, 's', 2)}, while "
                 f"the loop comes to rest over {quantity(end, 's', 2)}: expected it to change later, or not at all"
@@ -317,9 +403,9 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
         raise
 
 
-def _changes_of_sources(simulation: PreparedRun, end: float) -> Iterator[tuple[str, float]]:
-    """The signals of sources that change until `end` [s], and when first."""
-    times = np.linspace(0.0, end, INSTANTS)
+def _changes_of_sources(simulation: PreparedRun, start: float, end: float) -> Iterator[tuple[str, float]]:
+    """The signals of sources that change from `start` to `end` [s], and when first."""
+    times = np.linspace(start, end, INSTANTS)
     for signals, values in simulation.master.running.sources:
         changed = values.over(times) != values.over(times[:1])
         yield from ((signal, float(times[one.argmax()])) for signal, one in zip(signals, changed.T) if one.any())
@@ -329,12 +415,16 @@ def _changes_of_sources(simulation: PreparedRun, end: float) -> Iterator[tuple[s
 
 
 class TracedInstance:
-    """An FMU with the values last written to it, and the time of its last step."""
+    """An FMU with the values last written to it, and the time of its next step, by its own clock.
 
-    def __init__(self, fmu: Instance) -> None:
+    It may begin in a saved state, at the time of its next step then.
+    """
+
+    def __init__(self, fmu: Instance, begins: tuple[bytes, float] | None = None) -> None:
         self.fmu = fmu
         self.written: dict[str, float] = {}
-        self.time = 0.0
+        self.time = self._later = 0.0
+        self._begins = begins
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.fmu, name)
@@ -358,24 +448,36 @@ class TracedInstance:
     def enter_initialization(self, start: float, stop: float) -> None:
         """As `Simulator`, without an end: other runs begin where this one has come to rest."""
         self.fmu.enter_initialization(start, math.inf)
+        if self._begins is not None:
+            saved, time = self._begins
+            self.fmu.exit_initialization()
+            self.fmu.restore(saved)
+            self._later = time - start
+
+    def exit_initialization(self) -> None:
+        """As `Simulator`."""
+        if self._begins is None:
+            self.fmu.exit_initialization()
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
+        t += self._later
         self.fmu.step(t, h)
         self.time = t + h
 
 
-def tracing_loader(instances: Instances) -> Loader:
-    """A loader of instances as `TracedInstance`."""
-    return wrapping_loader(instances, TracedInstance)
+def tracing_loader(instances: Instances, start: Start | None = None) -> Loader:
+    """A loader of instances as `TracedInstance`, which may begin where a system has come to rest."""
+    saved: Mapping[str, tuple[bytes, float]] = {} if start is None else start.saved
+    return wrapping_loader(instances.load, lambda fmu: TracedInstance(fmu, saved.get(fmu.name)))
 
 
-def wrapping_loader(instances: Instances, wrapper: Callable[[Instance], object]) -> Loader:
-    """A loader of instances, each in a wrapper that has its attributes."""
+def wrapping_loader(of: Loader, wrapper: Callable[[Instance], object]) -> Loader:
+    """A loader of the instances of another, each in a wrapper that has its attributes."""
 
     @contextmanager
     def load(path: Path, instance_name: str, access: Access = USUAL) -> Iterator[Instance]:
-        with instances.load(path, instance_name, access) as fmu:
+        with of(path, instance_name, access) as fmu:
             yield cast(Instance, wrapper(fmu))
 
     return load

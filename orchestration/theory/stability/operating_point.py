@@ -12,8 +12,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import exact_nanoseconds
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.distribution import lowest
-from orchestration.systems.system.model import Criterion, System
-from orchestration.systems.system.paths import changed
+from orchestration.systems.system.model import AFTER, Criterion, System
+from orchestration.systems.system.paths import at_operating_point
 from orchestration.systems.system.placement import punctual
 from orchestration.theory.stability.in_double import in_double
 
@@ -32,7 +32,7 @@ def deterministic(system: System) -> System:
 
     Float code in C is in double precision. Raises `UsageError` as `in_double`.
     """
-    chosen = in_double(changed(system, system.operating_point))
+    chosen = in_double(at_operating_point(system))
     return replace(
         chosen,
         components={name: _punctual(component) for name, component in chosen.components.items()},
@@ -102,13 +102,41 @@ def exchanged_signals(system: System) -> Sequence[str]:
     return tuple(dict.fromkeys(start for x in system.connections for start in x.start))
 
 
-def expect_rest(system: System, calm: Floats) -> None:
-    """Raise `NotAnEquilibriumError` for an exchanged signal that changes; rows a period apart, shape (n, signals)."""
-    moved = np.abs(calm - calm[0]).max(axis=0) / np.maximum(1.0, np.abs(calm[0]))
+def time_to_rest(system: System) -> float:
+    """The time that a system runs before it is taken to rest at its operating point [s]."""
+    return float(system.operating_point.get(AFTER, 0.0))
+
+
+def expect_rest(system: System, calm: Floats, before: Floats) -> None:
+    """Raise `NotAnEquilibriumError` for an exchanged signal that changes; rows a period apart, shape (n, signals).
+
+    `before`: likewise after half of the time that it has run to rest, or from its start on.
+    """
+    moved = _moved(calm)
     worst = int(moved.argmax())
-    if moved[worst] > AT_REST:
+    if moved[worst] <= AT_REST:
+        return
+    signal, after, text = exchanged_signals(system)[worst], time_to_rest(system), f"moves by {moved[worst]:.2g}"
+    if not after:
         none = "" if system.operating_point else ", of which there are none"
         raise NotAnEquilibriumError(
-            f"the operating point is not at rest: {exchanged_signals(system)[worst]} moves by {moved[worst]:.2g}: "
-            f"expected values in [operating_point] at which the system rests{none}"
+            f"the operating point is not at rest: {signal} {text}, from {before[0, worst]:.4g} at the start: expected "
+            f"values in [operating_point] at which the system rests{none}, or {AFTER} = SECONDS there, which it runs "
+            "to rest first; a state without a parameter may also begin at rest by its own code"
         )
+    text = f"the operating point is not at rest after {after:g} s: {signal} {text} in {len(calm) - 1} periods"
+    if moved[worst] < 0.5 * _moved(before)[worst]:
+        raise NotAnEquilibriumError(
+            f"{text}, and by {_moved(before)[worst]:.2g} after half of that: expected a longer {AFTER} in "
+            "[operating_point]"
+        )
+    raise NotAnEquilibriumError(
+        f"{text}, no less than after half of that, as a loop that is unstable or oscillates: expected one that "
+        f"settles, or a longer {AFTER} in [operating_point], or without it values at which the system rests"
+    )
+
+
+def _moved(rows: Floats) -> Floats:
+    """By how much each signal changes, relative where it is above 1."""
+    change: Floats = np.abs(rows - rows[0]).max(axis=0) / np.maximum(1.0, np.abs(rows[0]))
+    return change

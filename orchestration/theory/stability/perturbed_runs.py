@@ -26,7 +26,13 @@ from orchestration.systems.system.model import System
 from orchestration.theory.stability import operating_point
 from orchestration.theory.stability.excitation import PULSE
 from orchestration.theory.stability.in_double import expect_same_law
-from orchestration.theory.stability.loop_at_rest import tracing_loader, wrapping_loader, written_in
+from orchestration.theory.stability.loop_at_rest import (
+    KnownTangents,
+    start_of,
+    tracing_loader,
+    wrapping_loader,
+    written_in,
+)
 
 LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
@@ -52,22 +58,25 @@ class Growth:
     """Duration of the two runs [s]"""
 
 
-def growth_of(system: System, instances: Instances, factor: float = 1.0) -> Growth:
+def growth_of(system: System, instances: Instances, factor: float = 1.0, known: KnownTangents | None = None) -> Growth:
     """The growth about the operating point of `system`; raises `UsageError` where the system does not rest there.
 
-    `factor` is that of the pulse.
+    `factor` is that of the pulse. Where one has come to rest that runs to rest is kept in `known`.
     """
     nominal = operating_point.deterministic(system)
     period = operating_point.hyperperiod_of(nominal) or operating_point.longest_period(nominal)
     horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST_INSTANTS * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
     interval = period * max(1, math.floor(horizon / period / MOST_INSTANTS))
+    start = start_of(nominal, period, instances, KnownTangents() if known is None else known)
+    load = tracing_loader(instances, start)
     unperturbed = _exchanged_rows(
-        nominal, tracing_loader(instances), interval, lambda run: expect_same_law(nominal, instances, written_in(run))
+        nominal, load, interval, lambda run: expect_same_law(nominal, instances, written_in(run))
     )
-    pulsing = wrapping_loader(instances, lambda fmu: Pulsed(fmu, factor))
-    perturbed = _exchanged_rows(nominal, pulsing, interval, lambda run: None)
-    operating_point.expect_rest(nominal, unperturbed[1:6])
+    perturbed = _exchanged_rows(
+        nominal, wrapping_loader(load, lambda fmu: Pulsed(fmu, factor)), interval, lambda run: None
+    )
+    operating_point.expect_rest(nominal, unperturbed[1:6], unperturbed[:1])
     count = min(len(unperturbed), len(perturbed))
     scale = np.maximum(1.0, np.abs(unperturbed[0]))
     difference = (perturbed[:count] - unperturbed[:count]) / scale

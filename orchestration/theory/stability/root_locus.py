@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal
@@ -28,7 +28,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart_of
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.loop_at_rest import KnownTangents, whole_at_rest
+from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start, whole_at_rest
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
     beside_others,
@@ -165,6 +165,8 @@ def locus(
 def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLocus:
     with errors_in_own_terms(varied.request), closing(Instances()) as instances:
         system, known = rested(varied.request), KnownTangents()
+        with suppress(UsageError):  # of one that is unstable, values from which it is stable may follow
+            keep_start(system, instances, known)
         found: dict[float, tuple[Complexes, float]] = {}
 
         def at(value: float) -> System:

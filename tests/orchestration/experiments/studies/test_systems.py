@@ -131,7 +131,10 @@ def test_an_fmu_may_be_an_axis(system: System, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "said"),
     [
-        ("timing.period", "timing.period: no such path; expected stop_time, seed or one that begins with components"),
+        (
+            "timing.period",
+            "timing.period: no such path; expected stop_time, seed, operating_point.after or one that begins with",
+        ),
         (
             "components.tank.step",
             "components.tank.step: expected components.NAME.KEY with NAME one of plant, controller",

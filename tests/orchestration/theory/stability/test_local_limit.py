@@ -38,7 +38,7 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
 def test_a_pulse_that_rounding_blurs_is_not_believed(
     monkeypatch: pytest.MonkeyPatch, enough: float, limit: float | None
 ) -> None:
-    def growth(system: Any, _: Any, factor: float = 1.0) -> Growth:
+    def growth(system: Any, _: Any, factor: float = 1.0, *others: Any) -> Growth:
         true = system.stop_time - 0.5
         return Growth(rate=true if factor >= enough else system.stop_time - BLURRED * factor**0.1, horizon=1.0)
 

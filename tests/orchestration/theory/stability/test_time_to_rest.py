@@ -1,0 +1,103 @@
+"""Systems that run to rest, as an integral does away from zero: a DC servo behind a bias of its amplifier."""
+
+import dataclasses
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import changed, value_at
+from orchestration.theory.exact.expect import expect
+from orchestration.theory.stability.loop_at_rest import KnownTangents
+from orchestration.theory.stability.period_map import growth_of_loop
+from orchestration.theory.stability.perturbed_runs import growth_of
+from quadcosim import UsageError, linearise, locus
+from tests.examples.common import native_example
+
+BIAS, DELAY, PERIOD, AFTER = 0.3, 0.002, 0.006, "operating_point.after"
+DELAY_PATH = "connections.command.delay"
+
+
+@pytest.fixture(scope="module")
+def servo() -> System:
+    system = native_example("dc_servo", {"connections.command.offset": BIAS})
+    return dataclasses.replace(system, operating_point={"after": 3.0})
+
+
+def by_hand(delay: float = DELAY) -> Floats:
+    """The map of the loop of a PID under a delay shorter than a period: angle, speed, last command and three states."""
+    K, Ti, Td, N = 0.96, 0.12, 0.049, 10.0
+
+    def flow(t: float) -> tuple[Floats, Floats]:
+        left = -np.expm1(-t)
+        return np.array([[1.0, left], [0.0, 1.0 - left]]), 1000.0 * np.array([t - left, left])
+
+    (_, first), (later, second) = flow(delay), flow(PERIOD - delay)
+    angle, last, integral, derivative, before = np.eye(6)[[0, 2, 3, 4, 5]]
+    damped = (Td * derivative - K * Td * N * (angle - last)) / (Td + N * PERIOD)
+    u = -K * angle + integral + damped
+    moved = flow(PERIOD)[0] @ np.eye(6)[:2] + np.outer(later @ first, before) + np.outer(second, u)
+    return np.vstack([moved, angle, integral - K * PERIOD / Ti * angle, damped, u])
+
+
+def test_an_integral_without_a_parameter_comes_to_rest_by_a_run_and_has_the_poles_of_its_matrices(
+    servo: System,
+) -> None:
+    loop = linearise(servo)
+    assert loop.operating_point["controller.u"] == pytest.approx(-BIAS, abs=1e-6)
+    expected = np.linalg.eigvals(by_hand())
+    found = np.array([one.z for one in loop.poles])
+    assert loop.radius == pytest.approx(np.abs(expected).max(), abs=1e-8)
+    assert all(np.abs(expected - one).min() < 1e-7 for one in found)
+
+
+def test_other_delays_begin_where_the_own_one_has_come_to_rest_also_where_the_loop_is_unstable(servo: System) -> None:
+    """From there no run comes to rest. The edge is that of the loop without a bias, whose rest is given."""
+    (crossing,) = locus(servo, DELAY_PATH, first=0.0, last=0.02, count=3).crossings
+    assert crossing.leaves
+    (given,) = locus(native_example("dc_servo"), DELAY_PATH, first=0.0, last=0.02, count=3).crossings
+    assert crossing.value == pytest.approx(given.value, abs=1e-8)
+    with pytest.raises(UsageError, match=r"leaves the operating point: .* from which it comes to rest in 3 s"):
+        linearise(changed(servo, {DELAY_PATH: 0.02}))
+
+
+def test_twin_runs_begin_at_the_same_rest(servo: System) -> None:
+    """Other parameters come to rest anew, for a saved state holds them."""
+    with closing(Instances()) as instances:
+        known = KnownTangents()
+        for gain in (0.96, 0.8):
+            system = changed(servo, {"components.controller.parameters.K": gain})
+            expected = growth_of_loop(system, instances, known=known)
+            assert growth_of(system, instances, known=known).rate == pytest.approx(expected, abs=1e-5)
+        assert known.start is not None
+        assert known.start.components["controller"].parameters["K"] == 0.8
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({AFTER: 0.0}, r"controller.u moves by 0.7, from 0 at the start: expected values .* or after = SECONDS there"),
+        ({AFTER: 0.5}, r"not at rest after 0.5 s: \S+ moves by \S+ in 5 periods, and by .*: expected a longer after"),
+        (
+            {AFTER: 0.5, "components.controller.parameters.K": 3.4},
+            "no less than after half of that, as a loop that is unstable or oscillates",
+        ),
+        ({AFTER: -1.0}, r"operating_point.after = -1.0: expected a time"),
+        ({AFTER: "soon"}, r"operating_point.after = soon: expected a time"),
+    ],
+)
+def test_what_does_not_rest_is_refused_with_what_there_is_instead(
+    servo: System, changes: dict[str, Any], expected: str
+) -> None:
+    with pytest.raises(UsageError, match=expected):
+        linearise(changed(servo, changes))
+
+
+def test_initial_values_have_no_distance_from_a_rest_that_a_run_has_found(servo: System) -> None:
+    assert value_at(servo, AFTER) == 3.0
+    with pytest.raises(UsageError, match="without after"):
+        expect(servo, horizon=1.0)
