@@ -80,7 +80,7 @@ class Certified:
         proved = (
             "no proof found" if self.certified is None else f"every sequence up to {shown(self.certified)} is stable"
         )
-        broken = f"none found up to {shown(self.largest)} that breaks the loop"
+        broken = f"none found up to {shown(self.largest)}, the most that is tried, that breaks the loop"
         if self.breaking is not None:
             broken = f"one of {shown(self.breaking)} breaks the loop"
         best = ""

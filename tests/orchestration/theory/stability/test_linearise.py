@@ -133,7 +133,7 @@ def test_a_delay_over_more_samples_than_are_tried_first_keeps_all_its_states() -
     [
         ("double_integrator", "plant", r"^component: plant: expected a sampled component$"),
         ("double_integrator", "contoller", r"^component: contoller: did you mean controller\?"),
-        ("four_components", None, r"as 3 are sampled; one of sensor, controller, engine$"),
+        ("four_components", None, r"of the 3 that are sampled: sensor, controller, engine$"),
     ],
 )  # fmt: skip
 def test_a_component_at_which_no_loop_can_be_cut_open_is_refused(
