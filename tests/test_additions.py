@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import re
+from collections import Counter
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from orchestration.simulation.engines.batch.folds import LANES
 from orchestration.simulation.figures.views import VIEWS
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.reductions import REDUCTIONS
+from orchestration.systems.signals.motions import MOTIONS
 from tests.places import ROOT
 from tests.slaves import get, put
 
@@ -28,6 +30,12 @@ DRAWN = "".join(
     for path in (ROOT / "tests").rglob(f"test_{name}.py")
 )
 COMMANDS = sorted(typer.main.get_command_name(place.split(".")[1]) for of in cli.COMMANDS.values() for place in of)
+LISTS_OF_MOTIONS = (
+    "command/flags.py",
+    "components/scaffold/controller_system.toml.tmpl",
+    "quadrotor/scenarios/translation.py",
+    "systems/system/connection.py",
+)
 FIGURES = sorted({name for view in VIEWS.values() for name in view.names})
 
 
@@ -110,6 +118,18 @@ def test_the_page_of_figures_has_every_figure_of_a_run() -> None:
     assert rows == {*FIGURES}, f"{rows ^ {*FIGURES}}: expected the same in the table of docs/figures.md, Of a run"
 
 
+def test_the_page_of_references_has_every_motion() -> None:
+    of_motions = PAGES[ROOT / "docs/references.md"].partition("## Motions by name")[2].partition("\n## ")[0]
+    rows = words(*re.findall(r"^\| (`.*?`) \|", of_motions, re.M))
+    assert rows == {*MOTIONS}, f"{rows ^ {*MOTIONS}}: expected the same in the table of docs/references.md"
+
+
+@pytest.mark.parametrize("file", LISTS_OF_MOTIONS)
+def test_every_list_of_motions_has_all(file: str) -> None:
+    text = " ".join((ROOT / "orchestration" / file).read_text(encoding="utf-8").replace(" or ", ", ").split())
+    assert ", ".join(MOTIONS) in text, f"orchestration/{file}: expected its list of motions to be {', '.join(MOTIONS)}"
+
+
 @pytest.mark.parametrize("kind", VIEWS)
 def test_every_figure_has_its_maker(kind: str) -> None:
     makers, names = {*VIEWS[kind].load().makers}, {*VIEWS[kind].names}
@@ -126,12 +146,14 @@ def test_a_page_and_a_test_have_every_command(name: str) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_no_command_has_a_flag_twice(name: str) -> None:
+    expected = "expected a name that no other flag of it has, in orchestration/command"
     try:
-        cli.command_line(name)
+        command = cli.command_line(name).commands[name]
     except ValueError as error:
-        pytest.fail(
-            f"quadcosim {name}: {error}: expected a name that no other flag of it has, in orchestration/command"
-        )
+        pytest.fail(f"quadcosim {name}: {error}: {expected}")
+    known = Counter(flag for one in command.params for flag in {*one.opts, *one.secondary_opts})
+    twice = [flag for flag, times in known.items() if times > 1]
+    assert twice == [], f"quadcosim {name}: {twice}: {expected}"
 
 
 @pytest.mark.parametrize("name", quadrotor().objectives)

@@ -53,8 +53,8 @@ def measured(
 ) -> Metrics:
     """The metrics of a flight whose position error has this norm, spread over the axes as 2:-3:6.
 
-    `others`: what objectives name beside position, command and limits, without its component, a vector by its parts, as
-    `**{"acceleration.x": …}`; default: 1.
+    `others`: what the plant measures, or objectives name, beside position, command and limits, without its component, a
+    vector by its parts, as `**{"acceleration.x": …}`; default: 1.
     """
     zero = np.zeros(len(t))
     desired = np.column_stack([zero + 1.0, zero - 2.0, 0.1 * t])
@@ -62,9 +62,10 @@ def measured(
     motors = {"thrust_max": motor_max, "thrust_min": 0.1, "arm.x": 0.2, "arm.y": 0.1, "drag_to_thrust": 0.02}
     limits = {"plant.thrust_max": thrust_max, "plant.thrust_min": 0.0, "plant.torque_max": torque_max}
     limits |= {f"plant.motor.{name}": value for name, value in motors.items()}
-    named = [name for name in scalars_beyond_exchanged() if name not in limits]
+    exchanged = [f"plant.{name}" for name in wiring.MEASUREMENT if name not in POSITION]
+    named = [*exchanged, *(name for name in scalars_beyond_exchanged() if name not in limits)]
     unknown = others.keys() - set(map(variable_of, named))
-    assert unknown == set(), f"{unknown}: expected some of {named}, without components, which objectives name"
+    assert unknown == set(), f"{unknown}: expected some of {named}, without components"
     signals = {
         "time": t,
         **{f"plant.{name}": position[:, i] for i, name in enumerate(POSITION)},
