@@ -79,9 +79,12 @@ MANY: dict[str, tuple[Callable[[Any], Any], Callable[[Any], object]]] = {
 
 
 @pytest.mark.parametrize("kind", MANY)
-def test_many_runs_are_asked_for_by_a_path_a_dictionary_or_an_object(kind: str) -> None:
+def test_many_runs_are_asked_for_by_a_path_a_dictionary_or_an_object(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     load, start = MANY[kind]
     path = EXAMPLES / "quadrotor" / f"{kind}.toml"
+    monkeypatch.chdir(path.parent)  # at which paths in tables start
     tables, loaded = read_toml(path, kind), load(path)
     tables.pop("scenario", None)
     for axis in (*tables.get("axes", ()), tables.get("axis", {})):
