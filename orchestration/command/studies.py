@@ -108,7 +108,9 @@ def export(
         option("--format", "Default: parquet and csv of a study, csv of a run; may be repeated.", "csv|mat|parquet"),
     ] = None,
     table: Annotated[str | None, TABLE] = None,
-    metric: Annotated[str | None, option("--metric", "Metric whose medians in the cells are written too.")] = None,
+    metric: Annotated[
+        str | None, option("--metric", "Metric whose medians, or shares, in the cells are written too.")
+    ] = None,
 ) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies.store import store_folder, store_path
@@ -129,8 +131,9 @@ def export(
     if table is None:
         return result_of_files(of_study(path, formats or (), study, metric, out=out))
     from orchestration.command.study_table import study_table
+    from orchestration.experiments.studies.shares import GOOD
 
-    printed = study_table(study, path, metric)
+    printed = study_table(study, path, metric or GOOD)
     written = of_study(path, formats or (), study, metric, out=out)
     for file in written:
         inform(str(file))  # standard output is the table alone, for a file

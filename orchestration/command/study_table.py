@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING
 from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
 from orchestration.experiments.studies.axes import name_of, quantity_of
 from orchestration.experiments.studies.shares import (
+    BOOLEAN,
+    GOOD,
     differences_of,
     differences_of_medians,
+    judged_by,
     laws_of,
     medians_of,
     shares_of,
     with_chance,
 )
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import OF_CELLS, expect_medians, frame, units_in
+from orchestration.experiments.studies.table import OF_CELLS, expect_metric_of_cells, frame, units_in
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.requirements import is_number
@@ -24,19 +27,21 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def study_table(study: Study, store: Path, metric: str | None = None) -> PrintedTable:
-    """A row for each cell with its share of good runs, or the median of a metric over them.
+def study_table(study: Study, store: Path, metric: str = GOOD) -> PrintedTable:
+    """A row for each cell with its share of good runs, or of those with another metric that is true, or a median.
 
-    Of two laws both stand side by side with their difference. The numbers are those of `shares.csv`, or of the file of
-    the medians. Raises `UsageError` for a study without repetitions, and for a metric that is none.
+    Of two laws both stand side by side with their difference. The numbers are those of the files that `export`
+    writes. Raises `UsageError` for a study without repetitions, and for a metric that is none.
     """
     if study.cell_names is None:
         raise UsageError(f"--table: {OF_CELLS}")
-    if metric is not None:
-        expect_medians(study, metric)
+    expect_metric_of_cells(study, metric)
     rows, names = with_chance(frame(store), study), study.cell_names
     laws, units, word = laws_of(rows, names), units_in(store), study.origin.criterion.outcomes[0]
-    cells = shares_of(rows, names) if metric is None else medians_of(rows, names, metric)
+    is_share = metric in BOOLEAN
+    if is_share:
+        rows, word = judged_by(rows, metric), word if metric == GOOD else labels.metric(metric)
+    cells = shares_of(rows, names) if is_share else medians_of(rows, names, metric)
     others = [axis for axis in study.cell_axes if laws is None or axis.name != laws.axis]
     quantities = {axis.name: quantity_of(axis, units) for axis in others}
     first = cells if laws is None else cells[cells[laws.axis] == laws.first]
@@ -47,7 +52,7 @@ def study_table(study: Study, store: Path, metric: str | None = None) -> Printed
         ]
         for axis in others
     }
-    if metric is None:
+    if is_share:
         texts = partial(_texts, column="share", decimals=decimals_of(cells["count"].max()))
         caption = f"Share of {word} runs of {cells['count'].max()} in each cell, with 95 % Wilson intervals"
     else:
@@ -56,13 +61,13 @@ def study_table(study: Study, store: Path, metric: str | None = None) -> Printed
         caption = f"Median of {title} over the {word} runs of each cell, with 95 % intervals of order statistics"
         caption += " and, in parentheses, their number"
     if laws is None:
-        columns[f"share {word}" if metric is None else "median"] = texts(cells)
+        columns[f"share {word}" if is_share else "median"] = texts(cells)
     else:
         by = [axis.name for axis in others]
         for law in (laws.first, laws.second):
             columns[_short(law)] = texts(first[by].merge(cells[cells[laws.axis] == law], how="left", on=by))
         minus = f"{_short(laws.second)} minus {_short(laws.first)}"
-        if metric is None:
+        if is_share:
             found, texts = differences_of(rows, names, laws), partial(texts, column="difference")
             caption += f"; difference: {minus}, with 95 % intervals by Newcombe's method for pairs"
         else:
@@ -71,8 +76,13 @@ def study_table(study: Study, store: Path, metric: str | None = None) -> Printed
             caption += f"; difference: median of {minus} over the pairs that are both {word}"
         columns["difference"] = texts(first[by].merge(found, how="left", on=by))
     if cells["low"].isna().any():
-        caption += "; no interval where nothing is random" + ("" if metric is None else ", or runs are too few")
-    numbers = cells.astype(object).where(cells.notna(), None).to_dict("records")
+        caption += "; no interval where nothing is random" + ("" if is_share else ", or runs are too few")
+    numbers = (
+        cells.astype(object)
+        .where(cells.notna(), None)
+        .rename(columns={GOOD: metric if is_share else GOOD})
+        .to_dict("records")
+    )
     return PrintedTable(caption=caption, heads=[*columns], rows=[*zip(*columns.values())], numbers=numbers)
 
 

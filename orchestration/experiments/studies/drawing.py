@@ -13,7 +13,7 @@ from orchestration.experiments.studies.axes import Axis, unit_points
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
-from orchestration.experiments.studies.shares import GOOD, with_chance
+from orchestration.experiments.studies.shares import BOOLEAN, GOOD, judged_by, with_chance
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -22,6 +22,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share, warn
 from orchestration.simulation.figures.style import SCREEN, Style, save
+from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.objectives import bound_of, judged_objective
 from orchestration.systems.system.requirements import is_number
 
@@ -103,11 +104,14 @@ def _over_axes(
                 f"{study.name}: expected one or two axes of numbers with values, at most one of names, "
                 "and design.repeat for the axis of repetitions, to draw"
             )
-        laws, table = named[0] if named else None, with_chance(table, study)
+        laws, table, of = named[0] if named else None, with_chance(table, study), metric
+        if metric in BOOLEAN:
+            table, of = judged_by(table, metric), GOOD
+            words = words if metric == GOOD else (labels.metric(metric), f"not {labels.metric(metric)}")
         if len(axes) == 1:
-            return {metric: cell_lines(table, axes[0], laws, metric, words, units=units, style=style)}
+            return {metric: cell_lines(table, axes[0], laws, of, words, units=units, style=style)}
         both = (axes[0], axes[1])
-        return {f"{metric}_map": cell_maps(table, both, laws, metric, words, units=units, style=style)}
+        return {f"{metric}_map": cell_maps(table, both, laws, of, words, units=units, style=style)}
     if len(axes) > 2:
         return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
     drawn = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}

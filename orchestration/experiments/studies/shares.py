@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 GOOD = "good"
-"""Metric that is drawn as a share"""
-
-
+"""Column of a table of runs: whether a run meets the criterion"""
+BOOLEAN = (GOOD, "diverged")
+"""Metrics of which cells have the share of the runs, of all, for which they are true; of others medians"""
 RANDOM = "random"
 """Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
 PAIR = "paired by"
@@ -37,6 +37,11 @@ def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
     cells = table.groupby([axis.name for axis in study.cell_axes], dropna=False)["design_index"]
     repeated = 0 if study.repeat is None else table[study.repeat]
     return table.assign(**{RANDOM: cells.transform(is_random).astype(bool), PAIR: repeated})
+
+
+def judged_by(table: "pd.DataFrame", metric: str) -> "pd.DataFrame":
+    """The table in which those runs are good for which a metric of `BOOLEAN` is true, for its shares."""
+    return table.assign(**{GOOD: table[metric]})
 
 
 def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "pd.DataFrame":

@@ -129,9 +129,9 @@ def export(
 
     Of a `study` with cells also the share of good runs of each as `shares`, likewise, and of two laws those of the
     second minus those of the first, as `differences`; of a `metric` its medians, as `medians_METRIC`, and of two laws
-    those of its differences in pairs, as `differences_METRIC`. Parquet has units in the metadata of its fields, as
-    `unit`; MAT has a structure `runs` with a field for each column, and `units` with the same fields. Warns of runs by
-    several engines.
+    those of its differences in pairs, as `differences_METRIC`; of one that is true or false, as `diverged`, its shares
+    likewise, as `shares_METRIC`. Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs`
+    with a field for each column, and `units` with the same fields. Warns of runs by several engines.
     """
     import pandas as pd
 
@@ -141,16 +141,21 @@ def export(
     tables, units = {"runs": rows}, units_in(path)
     if study is not None and study.cell_names is not None:
         cells, repeated = study.cell_names, shares.with_chance(rows, study)
-        tables["shares"] = shares.shares_of(repeated, cells)
-        if metric is not None:
-            unit = units.get(metric, "")
-            tables[f"medians_{metric}"] = shares.medians_of(repeated, cells, metric).assign(unit=unit)
-        if (laws := shares.laws_of(rows, cells)) is not None:
-            found = {"differences": shares.differences_of(repeated, cells, laws)}
-            if metric is not None:
-                medians = shares.differences_of_medians(repeated, cells, laws, metric)
-                found[f"differences_{metric}"] = medians.assign(unit=unit)
-            tables |= {n: pd.DataFrame({"law": laws.second, "minus": laws.first, **each}) for n, each in found.items()}
+        laws = shares.laws_of(rows, cells)
+        for name in dict.fromkeys((shares.GOOD, metric or shares.GOOD)):
+            end, unit, judged = "" if name == shares.GOOD else f"_{name}", units.get(name, ""), repeated
+            if is_share := name in shares.BOOLEAN:
+                judged = shares.judged_by(repeated, name)
+                tables[f"shares{end}"] = shares.shares_of(judged, cells).rename(columns={shares.GOOD: name})
+            else:
+                tables[f"medians{end}"] = shares.medians_of(repeated, cells, name).assign(unit=unit)
+            if laws is not None:
+                found = (
+                    shares.differences_of(judged, cells, laws)
+                    if is_share
+                    else shares.differences_of_medians(repeated, cells, laws, name).assign(unit=unit)
+                )
+                tables[f"differences{end}"] = pd.DataFrame({"law": laws.second, "minus": laws.first, **found})
     written = []
     with new_files(folder) as new:
         for name, content in tables.items():
@@ -208,15 +213,15 @@ def of_study(
     for kind in formats:
         _expect(kind, FORMATS)
     if metric is not None:
-        expect_medians(study, metric)
+        expect_metric_of_cells(study, metric)
     return export(store, out or store.parent, formats or FORMATS[:2], study, metric=metric)
 
 
-def expect_medians(study: Study | None, metric: str) -> None:
-    """Raise `UsageError` for a metric that is no number, and for a study without cells."""
+def expect_metric_of_cells(study: Study | None, metric: str) -> None:
+    """Raise `UsageError` for a metric that is a text, and for a study without cells."""
     if study is None or study.cell_names is None:
         raise UsageError(f"--metric {metric}: {OF_CELLS}")
-    known = [name for name in metrics_with(study.metric_names) if name not in (*TEXTS, shares.GOOD)]
+    known = [name for name in metrics_with(study.metric_names) if name not in TEXTS]
     if metric not in known:
         raise UsageError(f"--metric {metric}: {expected_name(metric, known)}")
 

@@ -22,6 +22,7 @@ from orchestration.experiments.studies.shares import (
     differences_of,
     differences_of_medians,
     interval_of_difference,
+    judged_by,
     medians_of,
     with_chance,
 )
@@ -66,6 +67,12 @@ def test_a_cell_is_the_share_of_its_good_runs_with_wilsons_interval() -> None:
     ]
     assert (cell["good"], cell["share"]) == (3, 3 / 8)
     assert (cell["low"], cell["high"]) == wilson(3, 8)
+
+
+def test_a_metric_that_is_true_or_false_has_its_share_of_all_runs() -> None:
+    diverged = judged_by(runs().assign(diverged=lambda table: ~table["good"]), "diverged")
+    cells = cells_of(diverged, ["controller", "timing.period"]).set_index(["controller", "timing.period"])
+    assert cells["share"].tolist() == [15 / 24, 1.0, 0.0, 0.0]
 
 
 def test_a_metric_of_a_cell_is_its_median_over_the_good_runs_and_failed_runs_do_not_count() -> None:
@@ -283,6 +290,11 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert set(medians["unit"]) == {"m"}
     of_medians = pd.read_csv(tmp_path / "results/study/differences_position_rmse.csv")
     assert list(of_medians)[3:] == ["pairs", "difference", "low", "high", "unit"]
+    table = main("export", "study.toml", "--format", "csv", "--metric", "diverged", "--table", "csv").stdout
+    assert table.splitlines()[0] == "controller,timing.period,count,diverged,share,low,high"
+    of_diverged = pd.read_csv(tmp_path / "results/study/differences_diverged.csv")
+    assert list(of_diverged)[3:] == ["difference", "low", "high"]
+    main("draw", "study.toml", "--metric", "diverged", "--out", "figures", "--format", "png")
     runs = pd.read_csv(tmp_path / "results/study/runs.csv")
     guids = {
         law: {quadcosim.read_model(fmu).description.guid for fmu in (law, f"native/{law}")}
