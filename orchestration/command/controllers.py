@@ -61,6 +61,7 @@ def compare(
     if cell is not None:
         (rerun,) = run.rerun_cells(loaded, [cell], workers=workers, engine=how)
         return _cell(loaded, rerun, run.stored_cell(loaded, cell, out))
+    figures = figures and table is None
     style = look.figure_style if figures else None
     compared = run.compare(
         loaded, out=out, workers=workers, dask=dask, engine=how, time_limit=time_limit, figures=figures, style=style
@@ -76,7 +77,7 @@ def _all_cells(comparison: "Comparison", compared: "Compared", again: str, table
     from orchestration.experiments.comparison.outcome import as_json
 
     summary = compared.summary
-    inform(f"{summary.path}: {summary.total} runs, {summary.flown} of them new; tables and pictures beside it")
+    inform(f"{summary.path}: {summary.total} runs, {summary.flown} of them new; its files are beside it")
     for each in summary.follows:
         inform(f"follows {each}")
     if summary.agreement is not None:

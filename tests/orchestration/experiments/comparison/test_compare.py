@@ -284,7 +284,8 @@ def test_a_comparison_is_printed_as_a_table(
 ) -> None:
     monkeypatch.chdir(folder)
     Path("two.toml").write_text(TWO_AXES)
-    lines = main("compare", "two.toml", "--native", "--no-figures", "--table", form).stdout.splitlines()
+    lines = main("compare", "two.toml", "--native", "--table", form).stdout.splitlines()
+    assert not [*Path("results").rglob("*.png")], "a table is printed without pictures"
     assert lines[0].startswith(first)
     assert lines[3].startswith(fourth)
     assert form == "csv" or "Shares of 2 initial conditions" in "".join(lines)
