@@ -290,8 +290,8 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert set(medians["unit"]) == {"m"}
     of_medians = pd.read_csv(tmp_path / "results/study/differences_position_rmse.csv")
     assert list(of_medians)[3:] == ["pairs", "difference", "low", "high", "unit"]
-    table = main("export", "study.toml", "--format", "csv", "--metric", "diverged", "--table", "csv").stdout
-    assert table.splitlines()[0] == "controller,timing.period,count,diverged,share,low,high"
+    printed = main("export", "study.toml", "--format", "csv", "--metric", "diverged", "--table", "csv").stdout
+    assert printed.splitlines()[0] == "controller,timing.period,count,diverged,share,low,high"
     of_diverged = pd.read_csv(tmp_path / "results/study/differences_diverged.csv")
     assert list(of_diverged)[3:] == ["difference", "low", "high"]
     main("draw", "study.toml", "--metric", "diverged", "--out", "figures", "--format", "png")
