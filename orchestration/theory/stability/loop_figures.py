@@ -26,7 +26,9 @@ NEAR, MOST = 2.0, 0.4
 """Half the width of the panel about 1, in distances of the slower half of the poles from it, and at most"""
 HIGHEST = 2.0
 """Largest spectral radius that is drawn"""
-ANGLES = (15.0, 30.0, 45.0, 90.0)
+LOWEST_PHASE = -720.0
+"""Phase down to which it is drawn [°]: that of a long delay falls on and on"""
+ANGLES = (15.0, 30.0, 45.0, 90.0, 180.0)
 """Distances of ticks of a phase [°]: the least with which they are few"""
 ROWS = 3
 """Rows of the labels of crossings, which stand in each in turn"""
@@ -60,6 +62,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     middle.axhline(-180.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.margins(y=0.15)
     low, high = middle.get_ylim()
+    middle.set_ylim(low := max(low, min(LOWEST_PHASE, high - 360.0)), high)
     middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
     above.secondary_xaxis("top", functions=(lambda w: w / math.tau, lambda f: f * math.tau)).set_xlabel(
