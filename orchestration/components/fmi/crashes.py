@@ -9,9 +9,9 @@ from collections.abc import Callable
 from typing import Any
 
 _SIGNALS = ("SIGSEGV", "SIGFPE", "SIGILL", "SIGTRAP")
-_TRAPS = (signal.SIGILL, getattr(signal, "SIGTRAP", None))
 _OF_CHECKS = " (index, overflow, division, shift or conversion that C leaves undefined)"
 """Checks that may have failed where code with checks ends itself: the signal does not tell which"""
+_MEANING = {"SIGFPE": " (integer division by zero)", "SIGILL": _OF_CHECKS, "SIGTRAP": _OF_CHECKS}
 _WITH_CONTEXT = 4
 """SA_SIGINFO of signal.h"""
 _COUNTER = {"x86_64": 168, "aarch64": 440}
@@ -66,7 +66,7 @@ def report_crashes(report: Callable[[str], None]) -> None:
         with contextlib.suppress(Exception):
             place = _place(libc, context)
             if place:
-                report(place + _OF_CHECKS * (number in _TRAPS))
+                report(place + _MEANING.get(signal.Signals(number).name, ""))
         signal.raise_signal(number)  # it ends the process when this returns
 
     handler = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)(crashed)

@@ -323,6 +323,7 @@ def test_a_crash_in_the_c_is_one_line_with_its_signal_and_its_place(integrator: 
         "extern void pd_bad(volatile int *); if (n++ == 3) pd_bad(0);": ("SIGSEGV", "bad.c:5 (pd_bad)"),
         "static char *none; if (n++ == 3) { __builtin_memcpy(none, &n, 99999); n = 0; }": ("SIGSEGV", "bad.toml:8"),
         "static void (*none)(void); if (n++ == 3) { none(); n = 0; }": ("SIGSEGV", "bad.toml:8"),
+        "static volatile int none; if (n++ == 3) n /= none;": ("SIGFPE", "bad.toml:8 (integer division by zero)"),
         "static struct { int of[3]; } all; all.of[n++] = 1;": (
             "SIGILL",
             "bad.toml:9 (index, overflow, division, shift or conversion that C leaves undefined)",
