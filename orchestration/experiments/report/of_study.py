@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from orchestration.experiments.report.blobs import Blobs
-from orchestration.experiments.report.model import OtherStudy, Report, ReportRun, ReportShare, Setting
+from orchestration.experiments.report.model import OtherStudy, Report, ReportRun, ReportShare, Setting, Shares
 from orchestration.experiments.report.repeated import maps_of_both, repeated_maps, runs_in_cells
 from orchestration.experiments.report.reruns import Rerun, fastest, rerun
 from orchestration.experiments.report.subset import MAX_IN_BATCHES, MAX_SINGLY, Wanted, points_for, select
@@ -95,7 +95,6 @@ def study_report(
     axes = axes_of(stored, study) if axes is None else axes
     metric = metric_of(stored, study)
     embedded = embed(study, stored, tracks, wanted, metric, choose)
-    by_chance = is_sample(stored, study)
     overall = _overall(stored, study)
     words = words_of(stored, study)
     runs = runs_in_cells(study, stored.rows, axes)
@@ -124,7 +123,7 @@ def study_report(
         shares=tuple(
             along
             for axis in axes
-            if repeated is None and (along := shares_along(stored.rows, axis, by_chance=by_chance)) is not None
+            if repeated is None and (along := _along(axis, stored, study)) is not None
         ),
         repeated=repeated,
         other=None if other is None or repeated is not None else over,
@@ -143,8 +142,7 @@ def _over(
         raise UsageError(
             f"{name}: its axes are {', '.join(own)}; expected those of {of}, over which it is drawn: {listed}"
         )
-    by_chance = is_sample(stored, study)
-    shares = (shares_along(stored.rows, axis, by_chance=by_chance) for axis in axes)
+    shares = (_along(axis, stored, study) for axis in axes)
     table = report_table(
         stored.rows, axes, (), stored.units, blobs, tracks={}, messages={},
         is_grid=json.loads(stored.about.get("grid", "null")) is not None,
@@ -158,9 +156,18 @@ def _summary_of_other(name: str, stored: Stored, study: Study | None) -> str:
 
 
 def _overall(stored: Stored, study: Study | None) -> ReportShare:
-    """The share over all runs; without an interval where values of axes were chosen, whatever seeds repeat them."""
-    drawn = study is None or all(axis.values is None or "seed" in axis.targets for axis in study.axes)
-    return share_of("all runs", None, stored.rows, by_chance=drawn and is_sample(stored, study))
+    return share_of("all runs", None, stored.rows, by_chance=is_by_chance(stored, study))
+
+
+def _along(axis: ColumnAxis, stored: Stored, study: Study | None) -> Shares | None:
+    return shares_along(stored.rows, axis, by_chance=is_by_chance(stored, study, axis.name))
+
+
+def is_by_chance(stored: Stored, study: Study | None, but: str | None = None) -> bool:
+    """Whether a share has an interval: not over chosen values of axes but one, whatever seeds repeat them."""
+    axes = () if study is None else study.axes
+    drawn = all(axis.values is None or "seed" in axis.targets for axis in axes if axis.name != but)
+    return drawn and is_sample(stored, study)
 
 
 def axes_of(stored: Stored, study: Study | None) -> list[ColumnAxis]:

@@ -18,6 +18,7 @@ from orchestration.experiments.studies.shares import (
     cells_of,
     differences_of,
     differences_of_medians,
+    medians_of,
 )
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
@@ -47,25 +48,29 @@ def cell_lines(
     units: Mapping[str, str],
     style: Style = SCREEN,
 ) -> Figure:
-    """The share of good runs with its interval at 95 %, or the median of a metric, over one axis.
+    """The share of good runs, or the median of a metric, with its interval at 95 %, over one axis.
 
     `laws` is an axis of names, such as controllers: a line for each.
     """
     across = quantity_of(axis, units)
     figure = style.figure(32.0)
     panel = figure.add_subplot()
-    found = cells_of(table, _names(axis, laws), metric)
-    groups = _by_law(found, laws)
+    names = _names(axis, laws)
+    found = cells_of(table, names)
+    shown = found if metric == GOOD else medians_of(table, names, metric).rename(columns={"median": "value"})
+    groups = _by_law(shown, laws)
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
         panel.plot(at, group["value"], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
-        if metric != GOOD:
+        if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
+            ends = np.abs(group[["low", "high"]].to_numpy().T - group["value"].to_numpy())
+            panel.errorbar(at, group["value"], ends, fmt="none", ecolor=how["color"], elinewidth=0.8, capsize=2.5)
             known = group[group["good"] > 0]
             for place, value, count in zip(across.of(known[axis.name]), known["value"], known["good"]):
                 panel.annotate(
-                    f"{count}", (place, value), (0.0, 4.0), textcoords="offset points", ha="center",
-                    fontsize="x-small", color=how["color"],
+                    f"{count}", (place, value), (3.0, -3.0), textcoords="offset points", va="top", fontsize="x-small",
+                    color=how["color"], path_effects=[withStroke(linewidth=1.5, foreground="white")],
                 )  # fmt: skip
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
@@ -77,7 +82,9 @@ def cell_lines(
     if laws is not None:
         place = "outside right upper" if style.is_wide else "outside lower center"
         figure.legend(loc=place, title=name_of(laws), ncols=1 if style.is_wide else len(groups))
-    style.set_title(figure, _repetitions(found, metric))
+    title = _repetitions(found, metric)
+    bars = "; bars: 95 % intervals of order statistics, where runs suffice" if title and metric != GOOD else ""
+    style.set_title(figure, title + bars)
     return figure
 
 

@@ -102,7 +102,8 @@ def _over_axes(
         if len(named) > 1 or not 1 <= len(axes) <= 2 or not listed:
             raise UsageError(
                 f"{study.name}: expected one or two axes of numbers with values, at most one of names, "
-                "and design.repeat for the axis of repetitions, to draw"
+                "and design.repeat for the axis of repetitions, to draw; export --table prints the cells over any axes "
+                "with values, report shows all runs, and compare draws shares over random initial conditions"
             )
         laws, table, of = named[0] if named else None, with_chance(table, study), metric
         if metric in BOOLEAN:

@@ -79,7 +79,7 @@ class Study:
         listed = [axis.name for axis in self.axes if axis.values is not None]
         if self.repeat is not None and self.repeat not in listed:
             raise UsageError(
-                f"design.repeat = {self.repeat}: {expected_name(self.repeat, listed)}, an axis with values or a number"
+                f"design.repeat = {self.repeat}: {expected_name(self.repeat, listed)}, the axes with values"
             )
         for axis in self.axes if self.repeat is not None else ():
             if axis.values is not None and len(set(axis.values)) < len(axis.values):  # one run would count as several

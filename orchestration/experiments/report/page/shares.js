@@ -6,7 +6,6 @@ function startShares() {
   if (report.kind !== "study" || !report.shares.length) return;
   byId("shares").hidden = false;
   byId("shares-title").textContent = `Share that is ${report.words[0]}`;
-  byId("shares-text").textContent = `All runs: ${shareText(report.overall)}.${report.overall.low === null ? " The runs are chosen, not drawn by chance, so that their shares have no interval." : " Bars: Wilson intervals at 95 %."}`;
   byId("shares-controls").replaceChildren(choice("along", report.shares.map((each, i) => [i, each.axis]), 0, (i) => { shares.of = Number(i); drawShares(); }));
   redraws.push(drawShares);
   drawShares();
@@ -15,6 +14,8 @@ function startShares() {
 function drawShares() {
   const { axis, unit, logarithmic, shares: found } = report.shares[shares.of];
   byId("shares-plot").redraw = drawShares;
+  const about = found.some((each) => each.low !== null) ? "Bars: Wilson intervals at 95 %." : "Runs at chosen values are counted together, which are not drawn by chance, so that the shares have no interval.";
+  byId("shares-text").textContent = `All runs: ${shareText(report.overall)}. ${about}`;
   const isNumber = found.every((each) => each.value !== null);
   const other = report.other?.shares.find((each) => each.axis === axis);
   const traces = [traceOfShares(report.title, axis, unit, found, isNumber, 0)];

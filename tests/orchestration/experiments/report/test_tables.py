@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from orchestration.experiments.report.blobs import Blobs
-from orchestration.experiments.report.of_study import Stored, _difference, is_sample
+from orchestration.experiments.report.of_study import Stored, _difference, is_by_chance, is_sample
 from orchestration.experiments.report.reruns import Rerun
 from orchestration.experiments.report.subset import MAX_POINTS, MIN_POINTS, evenly, points_for, select
 from orchestration.experiments.report.tables import ColumnAxis, report_table, share_of, shares_along
@@ -89,6 +89,13 @@ DRAWN = Axis(name="mass", targets=("plant.mass",), low=1.0, high=2.0)
 def test_runs_are_a_sample_where_axes_or_seeds_are_drawn(chosen: Study, by_chance: bool) -> None:
     stored = Stored(rows=[], metrics=[], units={}, about={})
     assert is_sample(stored, chosen) is by_chance
+
+
+def test_a_share_over_chosen_values_has_no_interval_though_others_of_the_study_have() -> None:
+    chosen, stored = study(PERIODS, DRAWN, method="random", samples=2), Stored(rows=[], metrics=[], units={}, about={})
+    assert is_by_chance(stored, chosen, "timing.period")
+    assert not is_by_chance(stored, chosen, "mass")
+    assert not is_by_chance(stored, chosen)
 
 
 def test_shares_are_by_value_or_by_part_of_the_range() -> None:

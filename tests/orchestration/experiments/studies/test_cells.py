@@ -254,6 +254,9 @@ def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     figure = cell_lines(runs(), LOSSES, LAWS, "position_rmse", WORDS, units={}, style=STYLES["paper"])
     assert [text.get_text() for text in figure.axes[0].texts] == ["16", "16", "16", "3", "6"]
     assert figure.axes[0].get_ylabel().endswith("where settled, and their number")
+    first = next(iter(figure.axes[0].collections)).get_segments()[0]  # type: ignore[attr-defined]
+    low, high = medians_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[3, ["low", "high"]]
+    assert first[:, 1].tolist() == [low, high], "the interval of the first place"
     assert not figure.get_suptitle()
     assert not cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=STYLES["paper"]).get_suptitle()
 
