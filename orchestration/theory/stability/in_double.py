@@ -56,8 +56,12 @@ def _twin(fmu: str) -> str:
 
 def are_in_double(components: Mapping[str, Component]) -> tuple[str, ...]:
     """The names of those that are."""
-    folder = wrap.in_double_folder()
-    return tuple(name for name, one in components.items() if Path(one.fmu).is_relative_to(folder))
+    return tuple(name for name, one in components.items() if is_in_double(one.fmu))
+
+
+def is_in_double(fmu: str | Path) -> bool:
+    """Whether the FMU of this path is float code in double precision."""
+    return Path(fmu).is_relative_to(wrap.in_double_folder())
 
 
 def of_code(names: Iterable[str]) -> str:

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ class Line:
     """A stub of an FMU: its input is its output some samples later, and decays in between."""
 
     name = "line"
+    model = SimpleNamespace(path="Line.fmu")
 
     def __init__(self, samples: int) -> None:
         self.kept: Floats = np.zeros(samples)
