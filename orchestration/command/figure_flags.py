@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from orchestration.simulation.figures.style import Style
 
 
+LEAST = 15.0
+"""Least width of a figure in sizes of its font: below, numbers of cells and names overlap"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class FigureFlags:
     """The flags on the command line; raises `UsageError` for invalid values."""
@@ -39,17 +43,27 @@ class FigureFlags:
             raise UsageError("--size: expected no --width; the size includes the width")
         if self.font_size is not None and not 1.0 <= self.font_size <= 100.0:
             raise UsageError(f"--font-size {self.font_size:g}: expected 1 to 100 points")
-        _ = self._extent
+        if (self.size, self.width, self.font_size) != (None, None, None):
+            _ = self.figure_style  # before what is drawn is simulated
 
     @property
     def figure_style(self) -> "Style":
-        """The style with the sizes and formats of these flags."""
+        """The style with the sizes and formats of these flags; raises `UsageError` for too little room for text."""
         from dataclasses import replace
 
+        from orchestration.simulation.figures.style import POINT
         from orchestration.simulation.figures.style import STYLES as KNOWN
 
         style = replace(KNOWN[self.style], formats=tuple(dict.fromkeys(self.format or WRITTEN)), **self._extent)
-        return style if self.font_size is None else replace(style, font=self.font_size)
+        style = style if self.font_size is None else replace(style, font=self.font_size)
+        if style.width < (least := LEAST * style.font * POINT):
+            given = {"--size": self.size, "--width": self.width, "--font-size": self.font_size}
+            flag = next(f"{name} {value}" for name, value in given.items() if value is not None)
+            raise UsageError(
+                f"{flag}: {style.width:g} mm are too narrow for text of {style.font:g} points; expected "
+                f"a width of at least {least:.0f} mm, or a smaller --font-size"
+            )
+        return style
 
     @property
     def _extent(self) -> dict[str, Any]:

@@ -54,6 +54,12 @@ def test_a_figure_has_the_size_that_was_asked_for_to_a_tenth_of_a_millimetre(tmp
     assert (sized.width, sized.height, sized.font) == (120.0, 80.0, 9.0)
 
 
+def test_a_figure_too_narrow_for_its_text_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"40: 40 mm are too narrow .* 10 points; .* at least 53 mm"):
+        FigureFlags(width="40")
+    assert FigureFlags(width="40", font_size=7.0).figure_style.width == 40.0
+
+
 def test_every_figure_is_written_as_a_sharp_picture_and_as_svg_unless_other_formats_are_asked_for(
     tmp_path: Path,
 ) -> None:
