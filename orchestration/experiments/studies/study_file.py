@@ -137,14 +137,20 @@ def base_of(file: HasBase, folder: Path) -> Request:
     """The system or scenario that a file is based on."""
     if file.scenario is not None and file.base:
         raise UsageError("scenario and base: expected one of them")
+    for key in ("scenario", "system"):
+        if isinstance(name := file.base.get(key), str):
+            raise UsageError(f'base.{key}: expected the path of a file in place of [base], as scenario = "{name}"')
     return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
 
 
-def control_loop_of(file: HasBase, folder: Path) -> ControlLoop:
-    """Likewise for files that need initial conditions; raises `UsageError` for a system without known ones."""
+def control_loop_of(file: HasBase, folder: Path, otherwise: str = "") -> ControlLoop:
+    """Likewise for files that need initial conditions.
+
+    Raises `UsageError` for a system without known ones, which says what takes it `otherwise`.
+    """
     base = base_of(file, folder)
     if not isinstance(base, ControlLoop):
-        raise UsageError("base: expected a scenario of the quadrotor, whose initial conditions are known")
+        raise UsageError("base: expected a scenario of the quadrotor, whose initial conditions are known" + otherwise)
     return base
 
 

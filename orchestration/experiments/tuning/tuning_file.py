@@ -86,7 +86,7 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
         raise UsageError("cost.bad: expected a value")
     starts = file.starts or StartsTable()
     ensemble = Starts(**starts.as_dict(without=("judged",)))
-    base = control_loop_of(file, path.parent)
+    base = control_loop_of(file, path.parent, ', or cost.by = "expect" for another system')
     return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=starts.judged)
 
 
