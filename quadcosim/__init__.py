@@ -40,6 +40,7 @@ from importlib import import_module
 from pathlib import Path
 
 from orchestration.foundation.basics.errors import in_python, set_wording
+from orchestration.foundation.basics.extras import explains_missing
 
 set_wording(in_python)
 
@@ -54,6 +55,7 @@ _HOMES = {alias.asname: (node.module, alias.name) for node in _IMPORTS for alias
 __all__ = sorted(_HOMES)
 
 
+@explains_missing
 def __getattr__(name):
     """Load only what is used: the command line answers `--help` without numpy."""
     if name not in _HOMES:

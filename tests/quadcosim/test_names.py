@@ -4,6 +4,7 @@ import ast
 import dataclasses
 import inspect
 import pydoc
+import sys
 from types import ModuleType
 
 import pytest
@@ -25,6 +26,13 @@ def test_completion_finds_all_names_and_nothing_else() -> None:
 def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module quadcosim has no attribute runn"):
         getattr(quadcosim, "runn")  # noqa: B009
+
+
+def test_a_name_that_needs_an_extra_says_which(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "flint", None)
+    monkeypatch.delitem(sys.modules, "orchestration.theory.certificates.basin", raising=False)
+    with pytest.raises(quadcosim.QuadcosimError, match=r"flint is not installed.*quadcosim\[certificates\]"):
+        getattr(quadcosim, "basin")  # noqa: B009
 
 
 def test_the_old_package_gives_the_same_objects() -> None:
