@@ -1,5 +1,6 @@
 """Figures of cells: shares of good runs with their intervals, medians, and the difference between two laws."""
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from orchestration.experiments.studies.axes import SCALES, Axis, Value, edges, name_of, quantity_of
+from orchestration.experiments.studies.axes import SCALES, Axis, Value, name_of, quantity_of
 from orchestration.experiments.studies.shares import (
     GOOD,
     TwoLaws,
@@ -34,6 +35,8 @@ HALF = 0.5
 """Share at which a map has its line"""
 MAX_LETTERS = 120
 """Most letters of a row of cells, over all panels, with a space after each: more do not fit into a figure"""
+MAX_TICKS = 108, 12
+"""Most letters of the ticks below a row of panels, and most ticks beside a panel"""
 OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{} • −"
 """Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
 
@@ -103,8 +106,8 @@ def cell_maps(
     `laws` is an axis of names, such as controllers: a panel for each, and for two of them one of their difference, with
     dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs that are both good.
     """
-    x, y = (quantity_of(axis, units) for axis in axes)
-    places = (edges(axes[0], x.of(table[axes[0].name])), edges(axes[1], y.of(table[axes[1].name])))
+    x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
+    places = (x.edges, y.edges)
     found = cells_of(table, _names(*axes, laws), metric)
     groups = _by_law(found, laws)
     count = 3 if len(groups) == 2 else len(groups)
@@ -148,9 +151,13 @@ def cell_maps(
         _difference(figure, panels[2], places, axes, (x, y), of_pairs, of, writes=has_room[MARKED] and repeats)
         panels[2].set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     for panel in panels[:count]:
-        panel.set(xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale], xlabel=x.title)
+        panel.set(xscale=x.scale, yscale=y.scale, xlabel=x.title)
         panel.xaxis.set_tick_params(labelbottom=True)
-        mesh.name_cells(panel, *(q.of(sorted(axis.values or ())) for q, axis in zip((x, y), axes)))
+        mesh.name_cells(panel, *(each.shown if each.is_even else None for each in (x, y)))
+        if not x.is_even:
+            panel.set_xticks(*x.ticks(MAX_TICKS[0] / columns / (x.longest + 1)))
+        if not y.is_even:
+            panel.set_yticks(*y.ticks(MAX_TICKS[1]))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
     excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
@@ -167,6 +174,28 @@ def cell_maps(
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
+
+
+class _Cells:
+    """The cells along an axis: as wide as its steps or, where these differ, equally wide, so that all have room."""
+
+    def __init__(self, axis: Axis, quantity: Quantity) -> None:
+        self._values, self._quantity, scale = np.array(sorted(axis.values or ()), float), quantity, SCALES[axis.scale]
+        self.title, self.shown = quantity.title, quantity.of(self._values)
+        steps = np.diff(np.log(self._values) if scale == "log" else self._values)
+        self.is_even = len(steps) < 2 or bool(steps.max() < 1.02 * steps.min())
+        self.scale = scale if self.is_even else "linear"
+        self.edges = mesh.edges(self.of(self._values), logarithmic=self.scale == "log")
+        self.longest = max(len(f"{value:g}") for value in self.shown)
+
+    def of(self, values: Any) -> Floats:
+        """The places of some of its values."""
+        return self._quantity.of(values) if self.is_even else np.asarray(np.searchsorted(self._values, values), float)
+
+    def ticks(self, most: float) -> tuple[list[int], list[str]]:
+        """Places and texts of as many values as have room, for cells that are equally wide."""
+        places = [*range(0, len(self.shown), math.ceil(len(self.shown) / max(1.0, math.floor(most))))]
+        return places, [f"{self.shown[i]:g}" for i in places]
 
 
 def _names(*axes: Axis | None) -> list[str]:
@@ -209,7 +238,7 @@ def _has_limit(share: Floats) -> bool:
 
 
 def _write_counts(
-    panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], group: "pd.DataFrame", form: str
+    panel: Axes, quantities: tuple["_Cells", "_Cells"], axes: tuple[Axis, Axis], group: "pd.DataFrame", form: str
 ) -> None:
     x, y = (quantity.of(group[axis.name]) for quantity, axis in zip(quantities, axes))
     for across, up, good, count, share in zip(x, y, *(group[name] for name in ("good", "count", "share"))):
@@ -218,7 +247,7 @@ def _write_counts(
 
 
 def _write_numbers(
-    panel: Axes, quantities: tuple[Quantity, Quantity], axes: tuple[Axis, Axis], numbers: "pd.Series", side: float
+    panel: Axes, quantities: tuple["_Cells", "_Cells"], axes: tuple[Axis, Axis], numbers: "pd.Series", side: float
 ) -> None:
     """Write numbers into the cells with the values of their index, that many points to the left of the middle."""
     places = zip(*(quantity.of(numbers.index.get_level_values(a.name)) for quantity, a in zip(quantities, axes)))
@@ -234,7 +263,7 @@ def _difference(
     panel: Axes,
     places: tuple[Floats, Floats],
     axes: tuple[Axis, Axis],
-    quantities: tuple[Quantity, Quantity],
+    quantities: tuple["_Cells", "_Cells"],
     found: "pd.DataFrame",
     of: str,
     *,

@@ -214,6 +214,15 @@ def test_a_map_without_room_for_how_many_of_all_runs_are_good_has_the_good_ones_
     assert figure.axes[3].get_xlabel() == "share of settled runs, and their number"
 
 
+def test_cells_of_uneven_values_are_equally_wide_and_named_by_them() -> None:
+    uneven = axis("timing.loss", 0.0, 0.1, 0.15)
+    table = runs().assign(**{"timing.loss": lambda each: each["timing.loss"].replace(0.2, 0.15)})
+    panel = cell_maps(table, (uneven, PERIODS), LAWS, "good", WORDS, units={}).axes[1]
+    assert panel.get_xlim() == (-0.5, 2.5)
+    assert [tick.get_text() for tick in panel.get_xticklabels()] == ["0", "0.1", "0.15"]
+    assert {text.get_position() for text in panel.texts} == {(i, period) for i in range(3) for period in (10.0, 20.0)}
+
+
 def test_the_numbers_of_two_colour_bars_side_by_side_do_not_touch() -> None:
     style = STYLES["paper"]
     with style.applied():
