@@ -393,7 +393,7 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     calm = rows_from(begin)
     start, end = (float(begin + k * period) / NANOSECONDS for k in (-1, SETTLED - 1))
     try:
-        expect_rest(system, calm, before)
+        expect_rest(system, calm, before, lambda signal: simulation.resolved.described[signal].unit)
     except NotAnEquilibriumError as error:
         for signal, change in _changes_of_sources(simulation, start if after else 0.0, end):
             raise NotAnEquilibriumError(

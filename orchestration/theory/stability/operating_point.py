@@ -10,6 +10,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import exact_nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import AFTER, Criterion, System
@@ -107,28 +108,34 @@ def time_to_rest(system: System) -> float:
     return float(system.operating_point.get(AFTER, 0.0))
 
 
-def expect_rest(system: System, calm: Floats, before: Floats) -> None:
+def expect_rest(
+    system: System, calm: Floats, before: Floats, unit: Callable[[str], str | None] = lambda _: None
+) -> None:
     """Raise `NotAnEquilibriumError` for an exchanged signal that changes; rows a period apart, shape (n, signals).
 
-    `before`: likewise after half of the time that it has run to rest, or from its start on.
+    `before`: likewise after half of the time that it has run to rest, or from its start on; `unit`: of a signal.
     """
     moved = _moved(calm)
     worst = int(moved.argmax())
     if moved[worst] <= AT_REST:
         return
-    signal, after, text = exchanged_signals(system)[worst], time_to_rest(system), f"moves by {moved[worst]:.2g}"
+    signal, after = exchanged_signals(system)[worst], time_to_rest(system)
+    first, by, by_half = (
+        quantity(value, unit(signal), digits)
+        for value, digits in ((before[0, worst], 4), (_change(calm)[worst], 2), (_change(before)[worst], 2))
+    )
+    text = f"{signal} moves by {by}"
     if not after:
         none = "" if system.operating_point else ", of which there are none"
         raise NotAnEquilibriumError(
-            f"the operating point is not at rest: {signal} {text}, from {before[0, worst]:.4g} at the start: expected "
+            f"the operating point is not at rest: {text}, from {first} at the start: expected "
             f"values in [operating_point] at which the system rests{none}, or {AFTER} = SECONDS there, which it runs "
             "to rest first; a state without a parameter may also begin at rest by its own code"
         )
-    text = f"the operating point is not at rest after {after:g} s: {signal} {text} in {len(calm) - 1} periods"
+    text = f"the operating point is not at rest after {after:g} s: {text} in {len(calm) - 1} periods"
     if moved[worst] < 0.5 * _moved(before)[worst]:
         raise NotAnEquilibriumError(
-            f"{text}, and by {_moved(before)[worst]:.2g} after half of that: expected a longer {AFTER} in "
-            "[operating_point]"
+            f"{text}, and by {by_half} after half of that: expected a longer {AFTER} in [operating_point]"
         )
     raise NotAnEquilibriumError(
         f"{text}, no less than after half of that, as a loop that is unstable or oscillates: expected one that "
@@ -136,7 +143,12 @@ def expect_rest(system: System, calm: Floats, before: Floats) -> None:
     )
 
 
+def _change(rows: Floats) -> Floats:
+    """By how much each signal changes."""
+    change: Floats = np.abs(rows - rows[0]).max(axis=0)
+    return change
+
+
 def _moved(rows: Floats) -> Floats:
     """By how much each signal changes, relative where it is above 1."""
-    change: Floats = np.abs(rows - rows[0]).max(axis=0) / np.maximum(1.0, np.abs(rows[0]))
-    return change
+    return np.asarray(_change(rows) / np.maximum(1.0, np.abs(rows[0])))

@@ -80,8 +80,8 @@ def test_twin_runs_begin_at_the_same_rest(servo: System) -> None:
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({AFTER: 0.0}, r"controller.u moves by 0.7, from 0 at the start: expected values .* or after = SECONDS there"),
-        ({AFTER: 0.5}, r"not at rest after 0.5 s: \S+ moves by \S+ in 5 periods, and by .*: expected a longer after"),
+        ({AFTER: 0.0}, r"controller.u moves by 0.7 V, from 0 V at the start: expected .* or after = SECONDS there"),
+        ({AFTER: 0.5}, r"not at rest after 0.5 s: \S+ moves by .* in 5 periods, and by .*: expected a longer after"),
         (
             {AFTER: 0.5, "components.controller.parameters.K": 3.4},
             "no less than after half of that, as a loop that is unstable or oscillates",
