@@ -33,7 +33,7 @@ ANGLES = (15.0, 30.0, 45.0, 90.0, 180.0)
 ROWS = 3
 """Rows of the labels of crossings, which stand in each in turn"""
 EDGE = 0.25
-"""Share of the width, from the left, in which a label stands to the right of its line"""
+"""Share of the width, from a side, in which a label has no room towards it"""
 LEAST = 1e-12
 """Least gain that is drawn: less is rounding, as of a slow task beyond half its own rate"""
 
@@ -106,11 +106,13 @@ def _mark_margins(
         beside: dict[str, Any]
         if axes is above:  # where a gain falls there is room below it to the left, and above it to the right
             first, last = np.log(frequencies[[0, -1]])
-            has_room = math.log(at) > first + EDGE * (last - first)
-            beside = {"xytext": (-5.0, 0.0), "ha": "right"} if end > none and has_room else {"xytext": (5.0, 0.0)}
-            axes.annotate(
-                size, (at, 0.5 * (none + end)), textcoords="offset points", va="center", color=color, **beside
-            )
+            share, place = (math.log(at) - first) / (last - first), 0.5 * (none + end)
+            beside = {"xytext": (5.0, 0.0), "va": "center"}
+            if end > none and share > EDGE:
+                beside = {"xytext": (-5.0, 0.0), "va": "center", "ha": "right"}
+            elif share > 1.0 - EDGE:
+                place, beside = none, {"xytext": (0.0, 3.0), "ha": "right"}
+            axes.annotate(size, (at, place), textcoords="offset points", color=color, **beside)
         else:
             beside = {"xytext": (0.0, -3.0), "va": "top"} if end > none else {"xytext": (0.0, 3.0)}
             axes.annotate(size, (at, none), textcoords="offset points", ha="center", color=color, **beside)
