@@ -25,7 +25,8 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
     """A system, or a scenario, for learning: an action is a command of a component, an observation its measurement.
 
     An episode is a run. It is terminated where that diverges or an FMU ends it, truncated at its stop time; `info` then
-    has the `metrics`. Each episode has its own seed for noise, loss and jitter, drawn from that of `reset`.
+    has the `metrics`. Each episode has its own seed for noise, loss and jitter, drawn from that of `reset`. Its last
+    observation has the true values: neither late, lost nor noisy.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium has it
@@ -92,6 +93,7 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
 class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # type: ignore[misc]
     """Many environments in SIMD lanes: each has the episodes of an `Environment` of its seed, to the bit.
 
+    Lanes run the C of your FMUs in Python, which may differ in the last bits.
     Where one is over, the next step begins its next episode: it ignores the action and returns the first observation
     with a reward of 0 (`AutoresetMode.NEXT_STEP`). There are no metrics.
     """
@@ -136,6 +138,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
         """Begin an episode in each; a number as `seed` is that of the first, one more for each that follows.
 
         `options` are values by path on top of those that `starts` draws: one for all, or an array with one for each.
+        They hold for the episodes that this begins, not for those that begin by themselves later.
         """
         seeds = self._seeds(seed)
         if not self._random:
@@ -175,6 +178,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
 
     def _begin(self, places: Any, options: Mapping[str, Any]) -> None:
         drawn, seeds = zip(*(_episode(self._random[place], self._starts) for place in places.tolist()))
+        for each in drawn:
+            if each.keys() != drawn[0].keys():
+                raise UsageError(f"starts: returned {[*each]} and {[*drawn[0]]}: expected the same paths in each call")
         values = {path: np.array([each[path] for each in drawn]) for path in drawn[0]}
         self.runs.begin(places, seeds, {**values, **options})
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.records import replaced
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.simulation.engines.batch.batch import Group
@@ -81,7 +81,7 @@ class SteppedRuns:
         self._order: Integers = np.zeros(count, dtype=np.int64)
         """The lane of each run, counted over all groups"""
         self.measurement: Floats = np.zeros((count, len(self.measured)))
-        """Measurement of each run; of one that is over, what would be measured then"""
+        """Measurement of each run; of one that is over, the true values then, neither late, lost nor noisy"""
         self.diverged: Booleans = np.zeros(count, dtype=np.bool_)
         self.over: Booleans = np.zeros(count, dtype=np.bool_)
         """Whether each run is over: diverged, or at its end"""
@@ -94,6 +94,7 @@ class SteppedRuns:
         self._leave(places)
         with errors_in_own_terms(self._request):
             own = columns(self._request, self._system, self._models, {**values, "seed": seeds})
+            _expect_one_each(own, len(seeds))
             several = {id(system): system for system in own.systems}
             known = {key: (outline(each), schedule_key(each)) for key, each in several.items()}
             connected = {key: connect_references(each, self._models) for key, each in several.items()}
@@ -157,7 +158,7 @@ class SteppedRuns:
         waiting = batch.waiting
         values = np.where(waiting[:, None], batch.measurement, batch.measurement_at_end())
         self.measurement[places], self.over[places] = values[lanes], ~waiting[lanes]
-        self.diverged[places] = batch.diverged[lanes]
+        self.diverged[places] = batch.diverged(lanes, places)
         group.over = not waiting.any()
 
     def _leave(self, places: Integers) -> None:
@@ -186,3 +187,11 @@ class SteppedRuns:
         if self._free[key]:
             return self._free[key].pop()
         return SteppedBatch(self._shapes[key], self._schedules, self.measured, self.commanded)
+
+
+def _expect_one_each(own: Columns, count: int) -> None:
+    """Raise `UsageError` for values of which there is neither one for all runs nor one for each."""
+    for target, array in own.given.items():
+        if array.shape not in ((), (1,), (count,)):
+            value = array[0] if array.ndim > 1 else array
+            raise UsageError(f"{target} = {shown(repr(value))}: expected a number, true, false or a text")

@@ -30,8 +30,8 @@ from orchestration.systems.schedule.streams import Streams
 class Simulation:
     """A run of a system, or a scenario, in which your code takes the place of one component.
 
-    The run stops wherever that component is to be stepped, returns its inputs (late, lost and noisy as in the system),
-    and goes on with the outputs that your code computes::
+    The run stops wherever that component is to be stepped, returns its inputs (late, lost and noisy as in the system;
+    at the end of the run the true values), and goes on with the outputs that your code computes::
 
         with quadcosim.Simulation(Scenario()) as simulation:
             measurement = simulation.reset(seed=1)
@@ -91,8 +91,9 @@ class Simulation:
         return self._next_measurement()
 
     def step(self, command: Any) -> Floats:
-        """Go on with a command and return the next measurement; at the end of the run, what would be measured then.
+        """Go on with a command and return the next measurement; at the end of the run, the true values then.
 
+        These, also where a run diverges, are neither late, lost nor noisy: the component is not stepped there.
         `command` is an array with one number for each of `commanded`, or their values by name. Raises `UsageError` for
         anything else, and where no run is under way.
         """

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from orchestration.foundation.basics.errors import Named, SimulatorError, UsageError
-from orchestration.foundation.basics.simulator import Booleans, Floats
+from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.batch.batch import Batch, Group
 from orchestration.simulation.engines.batch.shape import Shape
@@ -76,15 +76,14 @@ class SteppedBatch(Batch):
         bits = self._loop.awaiting & self._loop.alive
         return np.array([bits >> lane & 1 for lane in range(self.count)], dtype=np.bool_)
 
-    @property
-    def diverged(self) -> Booleans:
-        """Whether each run has diverged; raises `SimulatorError` for one that has failed."""
-        outcomes = np.array(self._loop.outcome[: self.count])
-        for lane in np.flatnonzero((outcomes != self._c.RUNNING) & (outcomes != self._c.DIVERGED)).tolist():
-            time = seconds(self._loop.outcome_time[lane])
+    def diverged(self, lanes: Integers, places: Integers) -> Booleans:
+        """Whether runs in these lanes have diverged; raises `SimulatorError`, with its place, for one that failed."""
+        outcomes = np.array(self._loop.outcome[: self.count])[lanes]
+        for i in np.flatnonzero((outcomes != self._c.RUNNING) & (outcomes != self._c.DIVERGED)).tolist():
+            time = seconds(self._loop.outcome_time[lanes[i]])
             raise SimulatorError(
-                f"a run in lanes has failed at t = {time:g} s, for its FMUs cannot compute a step; "
-                "alone, with the same seed and values, it says which and why"
+                f"run {places[i]}, counted from 0, has failed in lanes at t = {time:g} s, for its FMUs cannot compute "
+                "a step; alone, with the same seed and values, it says which and why"
             )
         diverged: Booleans = outcomes == self._c.DIVERGED
         return diverged
@@ -96,7 +95,7 @@ class SteppedBatch(Batch):
         return measured
 
     def measurement_at_end(self) -> Floats:
-        """What would be measured now, as at the end of a run, where the component is not stepped."""
+        """The true values of the inputs now, as at the end of a run, where the component is not stepped."""
         values: Floats = self.measurement.copy()
         for i, places in self._into:
             sender = self.arrays.memories[self._shape.names.index(self._shape.system.connections[i].sender)]

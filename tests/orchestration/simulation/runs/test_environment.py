@@ -15,7 +15,7 @@ from scipy.linalg import solve_discrete_are
 
 import quadcosim
 from orchestration.components.building import fmus
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
 from tests.native import NATIVE
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.runs.test_stepping import law
@@ -236,6 +236,22 @@ def test_what_cannot_be_is_refused_in_a_line_in_lanes_too() -> None:
         many.runs.value("plant.mas")
     with pytest.raises(UsageError, match=r"plant.initial.position.w: QuadrotorPlant has no such variable"):
         many.reset(options={"plant.initial.position.w": 1.0})
+    with pytest.raises(
+        UsageError, match=r"^plant.mass = array\(\[1., 2.\]\): expected a number, true, false or a text$"
+    ):
+        gym.VectorEnvironment(SHORT, reward, num_envs=2, low=LOW, high=HIGH, starts=two_masses).reset()
+    with pytest.raises(SimulatorError, match=r"^run 1, counted from 0, has failed in lanes at t = 0 s"):
+        many.reset(options={"plant.mass": np.array([1.0, 0.0])})
+    masses = iter([{"plant.mass": 1.0}, {}])
+    uneven = gym.VectorEnvironment(SHORT, reward, num_envs=2, low=LOW, high=HIGH, starts=lambda random: next(masses))
+    with pytest.raises(
+        UsageError, match=r"^starts: returned \[\] and \['plant.mass'\]: expected the same paths in each"
+    ):
+        uneven.reset()
+
+
+def two_masses(random: np.random.Generator) -> dict[str, Any]:
+    return {"plant.mass": np.array([1.0, 2.0])}
 
 
 def test_who_imports_gymnasium_finds_it() -> None:
