@@ -94,6 +94,7 @@ class Simulation:
         """Go on with a command and return the next measurement; at the end of the run, the true values then.
 
         These, also where a run diverges, are neither late, lost nor noisy: the component is not stepped there.
+        Inputs that a source feeds keep the values of the last step.
         `command` is an array with one number for each of `commanded`, or their values by name. Raises `UsageError` for
         anything else, and where no run is under way.
         """
