@@ -60,6 +60,13 @@ def test_what_is_forgotten_is_no_pole() -> None:
     assert np.sort(poles_of(rotation @ chain @ rotation.T).real) == pytest.approx([-0.25, 0.5])
 
 
+def test_a_state_in_a_small_unit_is_a_pole_too() -> None:
+    """Beside one whose numbers are 1e12 times as large: it moves the largest pole."""
+    loop = np.array([[0.99, 2e10, 0.0], [-1e-14, 0.9, 0.0], [0.0, 0.0, 0.0]])
+    expected = sorted(abs(np.linalg.eigvals(loop[:2, :2])), reverse=True)
+    assert abs(poles_of(loop))[:2] == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> None:
     """Within a twentieth of the other one, though both values of the locus are two of it apart."""
     system, period = example("dc_servo"), "components.controller.sampling.period"
