@@ -60,9 +60,10 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     for axes in (above, below):
         axes.axhline(0.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.axhline(-180.0, color=GREY, linewidth=1.0, linestyle=":")
-    middle.margins(y=0.15)
-    low, high = middle.get_ylim()
-    middle.set_ylim(low := max(low, min(LOWEST_PHASE, high - 360.0)), high)
+    lowest, highest = middle.dataLim.intervaly
+    lowest = max(lowest, min(LOWEST_PHASE, highest - 360.0))
+    beyond = 0.15 * (highest - lowest)
+    low, high = middle.set_ylim(lowest - beyond, highest + beyond)
     middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
     above.secondary_xaxis("top", functions=(lambda w: w / math.tau, lambda f: f * math.tau)).set_xlabel(
@@ -119,9 +120,9 @@ def _mark_margins(
 
 
 def _phase(gain: Complexes) -> Floats:
-    """The phase without jumps [°], its median in the turn below 0."""
+    """The phase without jumps [°], from between -270 and 90 at the lowest frequency."""
     phase = np.degrees(np.unwrap(np.angle(gain)))
-    unturned: Floats = phase - 360.0 * np.ceil(np.median(phase) / 360.0)
+    unturned: Floats = phase - 360.0 * np.ceil((phase[0] - 91.0) / 360.0)
     return unturned
 
 
