@@ -9,10 +9,10 @@ import numpy.typing as npt
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.processes.passable import passable
 
-NO_RANK = (1e-10, 1e-12, 1e-14, 0.0)
-"""Singular values, as shares of the largest, of what a period forgets: the first that keeps the largest pole"""
-SAME = 1e-6
-"""Difference of the largest pole, relative, up to which it is kept"""
+NO_RANK = 1e-10
+"""Singular value, as a share of the largest, of what a period forgets, each state in a unit of its own"""
+BALANCINGS = 60
+"""Most rounds in which these units are chosen"""
 DRIFT = 1e-9
 """Distance of a pole from 1 at which it has neither damping nor a direction"""
 
@@ -46,19 +46,26 @@ def _as_pole(z: complex, dt: float) -> Pole:
 
 def poles_of(matrix: Floats) -> Complexes:
     """The eigenvalues of a matrix without those at 0, which rounding would scatter where they are multiple."""
-    radius = float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
-    for share in NO_RANK:
-        found = _remembered(matrix, share)
-        if abs(np.abs(found).max(initial=0.0) - radius) <= SAME * radius or radius < SAME:
-            break
-    return found[np.argsort(-np.abs(found), kind="stable")]
-
-
-def _remembered(matrix: Floats, share: float) -> Complexes:
+    matrix = _balanced(matrix)
     while len(matrix):
         left, sizes, _ = np.linalg.svd(matrix)
-        rank = int((sizes > share * max(1.0, float(sizes[0]))).sum())
+        rank = int((sizes > NO_RANK * max(1.0, float(sizes[0]))).sum())
         if rank == len(matrix):
             break
         matrix = left[:, :rank].T @ matrix @ left[:, :rank]
-    return np.asarray(np.linalg.eigvals(matrix), dtype=complex)
+    found: Complexes = np.linalg.eigvals(matrix).astype(complex)
+    return found[np.argsort(-np.abs(found), kind="stable")]
+
+
+def _balanced(matrix: Floats) -> Floats:
+    """The same map with states in units, powers of two, in which each moves others as much as they move it."""
+    for _ in range(BALANCINGS):
+        others = np.abs(matrix - np.diag(np.diag(matrix)))
+        moved, moves = others.sum(axis=1), others.sum(axis=0)
+        has_both = (moved > 0.0) & (moves > 0.0)
+        ratio = np.divide(moves, moved, where=has_both, out=np.ones(len(matrix)))
+        unit = 2.0 ** np.round(0.25 * np.log2(ratio))  # half the way, as all change at once
+        if (unit == 1.0).all():
+            break
+        matrix = matrix * unit[:, None] / unit
+    return matrix
