@@ -13,7 +13,6 @@ import numpy as np
 from orchestration.components.fmi.instance import Instance
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.stability.in_double import is_in_double
 from orchestration.theory.stability.operating_point import AT_REST
 
 PULSE = 1e-6
@@ -260,14 +259,10 @@ class Excitation:
                 raise self._imprecise(f"has outputs that jump as {self.inputs[i]} changes by {self.pulse:.2g}")
 
     def _imprecise(self, what: str) -> ImpreciseError:
-        kind, expected = (
-            ("that", "the steps of a converter as quantisation of its connection, which linear theory leaves out")
-            if is_in_double(self._fmu.model.path)
-            else ("in single precision, or that", "an FMU in double precision, or its C through quadcosim wrap")
-        )
         return ImpreciseError(
-            f"{self.name} {what}, as code {kind} quantises or has a dead zone: what small deviations do cannot be "
-            f"told: expected {expected}"
+            f"{self.name} {what}, as code in single precision, or that quantises or has a dead zone: what small "
+            "deviations do cannot be told: expected double precision, floats as C with quadcosim wrap, and the steps "
+            "of a converter as quantisation of its connection, which linear theory leaves out"
         )
 
     def _expect_small_ones_followed(self, rungs: Sequence[Rung]) -> None:

@@ -56,12 +56,7 @@ def _twin(fmu: str) -> str:
 
 def are_in_double(components: Mapping[str, Component]) -> tuple[str, ...]:
     """The names of those that are."""
-    return tuple(name for name, one in components.items() if is_in_double(one.fmu))
-
-
-def is_in_double(fmu: str | Path) -> bool:
-    """Whether the FMU of this path is float code in double precision."""
-    return Path(fmu).is_relative_to(wrap.in_double_folder())
+    return tuple(name for name, one in components.items() if Path(one.fmu).is_relative_to(wrap.in_double_folder()))
 
 
 def of_code(names: Iterable[str]) -> str:
@@ -133,14 +128,14 @@ def _responses(
 
 
 def _course(
-    fmus: Mapping[str, Instance],
+    instances: Mapping[str, Instance],
     parts: Mapping[str, Component],
     held: Mapping[str, Mapping[str, float]],
     rng: np.random.Generator,
     size: float,
 ) -> Floats:
     writes, reads = [], []
-    for name, fmu in fmus.items():
+    for name, fmu in instances.items():
         ends, outputs = (
             list(held[name]),
             [v.name for v in fmu.model.variables.values() if v.causality == "output" and v.kind == "Real"],
@@ -152,7 +147,7 @@ def _course(
         reads.append((fmu.reader(outputs, into), into))
     rows = []
     for k in range(SAMPLES):
-        for (name, fmu), (write, given, rest, most) in zip(fmus.items(), writes):
+        for (name, fmu), (write, given, rest, most) in zip(instances.items(), writes):
             given[:] = rest + most * rng.uniform(-1.0, 1.0, len(rest))
             write()
             sampling = parts[name].sampling

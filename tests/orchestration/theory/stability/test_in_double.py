@@ -108,7 +108,7 @@ def test_code_that_relies_on_the_bits_of_a_float_is_refused_by_what_it_does(tmp_
 
 def test_a_converter_within_the_code_is_refused_with_its_place_in_the_system(tmp_path: Path) -> None:
     code = PI_C.replace("x - 10.0f", "0.005f * rintf((x - 10.0f) / 0.005f)")
-    with pytest.raises(UsageError, match=r", as code that quantises .*: expected .* as quantisation of its connection"):
+    with pytest.raises(UsageError, match=r", or that quantises .*: expected .* as quantisation of its connection"):
         linearise(load_system(written(tmp_path, code)))
 
 

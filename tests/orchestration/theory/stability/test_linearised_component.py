@@ -261,7 +261,7 @@ class Noisy(Line):
     [
         (Quantising(2), "follows a change of u by 0.01, but not by 1e-06"),
         (Noisy(2), "jump as u changes by"),
-        (InSinglePrecision(2), r"as code in single precision.* expected an FMU in double precision, or its C"),
+        (InSinglePrecision(2), r"as code in single precision.* expected double precision, floats as C with"),
     ],
 )
 def test_of_a_component_that_rounds_coarsely_nothing_is_told(fmu: Line, said: str) -> None:
