@@ -9,7 +9,7 @@ from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult, option_group
-from orchestration.foundation.basics.terminal import in_columns, inform, inform_in_passing
+from orchestration.foundation.basics.terminal import in_columns, inform
 
 
 @option_group("look", FigureFlags)
@@ -72,7 +72,7 @@ def limit(
     request = request_from(scenario, flags, timing)
     found = limits.limit(
         request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
-        continuous=continuous, workers=workers, engine=how or "auto", announce=inform_in_passing,
+        continuous=continuous, workers=workers, engine=how or "auto",
     )  # fmt: skip
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:

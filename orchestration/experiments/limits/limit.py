@@ -10,7 +10,7 @@ from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import DIGITS, Bracket, Range, bisected, ends_of_good
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
-from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter
+from orchestration.foundation.basics.terminal import ShareProgress, inform_in_passing, share_reporter
 from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
@@ -49,7 +49,7 @@ def limit(
     workers: int = 1,
     engine: Engine | Literal["auto"] = "auto",
     progress: ShareProgress = "bar",
-    announce: Callable[[str], None] | None = inform,
+    announce: Callable[[str], None] | None = inform_in_passing,
 ) -> Limit:
     """Find the largest value of a quantity of a system or a scenario at which it is still good.
 
@@ -57,7 +57,8 @@ def limit(
     component. The search runs from `first` to `last` in steps of `scan`; `continuous` adds a run near continuous time
     (quadrotor only). The seeds of a random quantity are run by `workers` processes. The engine `auto` uses native twins
     of the FMUs if available. `progress` is called with the share done of a search in which nothing fails before the end
-    of the scan, `announce` with the choice of the engine and a line for each evaluated value; None for silence.
+    of the scan, `announce` with the choice of the engine and a line for each evaluated value, by default beside the
+    bar; None for silence.
 
     Raises `UsageError` for an invalid quantity, range, tolerance, step or confidence.
     """

@@ -69,12 +69,10 @@ _BARS: list[Callable[[str], None]] = []
 
 
 def inform_in_passing(text: str) -> None:
-    """Print one line about the progress of work, which beside a bar replaces the one before, and goes with it."""
-    if _BARS:
-        _BARS[-1](text)
-        detail(text)
-    else:
-        inform(text)
+    """Show one line about the progress of work in place of a bar's text, with which it goes; verbose: print it."""
+    for bar in _BARS[-1:]:
+        bar(text)
+    detail(text)
 
 
 @contextmanager

@@ -25,6 +25,8 @@ QUANTITIES = (PERIOD, "delay", "jitter", "loss")
 """Names of quantities that a request may have; any other is a path"""
 STEPS, PARTS = 20, 50
 """Number of steps of the scan of a given range, and of tolerances in a step"""
+OWN = 0.2
+"""Share of the file's own delay that is the unit of its range where it is more than a period"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,8 +165,8 @@ def _range_by_period(varied: Varied) -> Range | None:
     ]
     if name not in ("delay", "delay_jitter") or not periods or max(periods) == 0.0:
         return None
-    most, period = 50.0 if name == "delay" else 10.0, max(periods)
-    return Range(first=0.0, step=period / 2.0, last=most * period, tolerance=period / 20.0)
+    most, unit = 50.0 if name == "delay" else 10.0, max(*periods, OWN * (varied.own or 0.0))
+    return Range(first=0.0, step=unit / 2.0, last=most * unit, tolerance=unit / 20.0)
 
 
 def unit_at(path: str, models: Mapping[str, Model]) -> str | None:

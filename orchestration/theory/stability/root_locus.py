@@ -143,10 +143,10 @@ def locus(
 
     Quantities are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the period of
     the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
-    times that of the file, delays up to ten periods. Holds and delays are included; jitter, loss, noise and
-    quantisation are left out. A pair of crossings between two neighbouring values is not seen, but for jumps of a delay
-    to a sampled component: both sides of each are tried. A period beside others crosses between two at which all
-    coincide.
+    times that of the file, delays up to ten periods or twice that of the file. Holds and delays are included; jitter,
+    loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen, but for
+    jumps of a delay to a sampled component: both sides of each are tried. A period beside others crosses between two at
+    which all coincide.
 
     Raises `UsageError` for an invalid quantity or range, and as `linearise`.
     """

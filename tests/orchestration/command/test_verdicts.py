@@ -88,11 +88,10 @@ def test_means_that_are_infinite_are_the_answer() -> None:
     assert cast("Any", Expected.verdict).fget(found) == "no mean of squares is finite: mean-square radius 1.2 in 100 ms"
 
 
-def test_progress_beside_a_bar_replaces_its_text_and_goes_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    printed: list[str] = []
+def test_progress_in_passing_is_the_text_of_a_bar_and_never_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    printed, beside = list[str](), list[str]()
     monkeypatch.setattr(terminal, "inform", printed.append)
-    monkeypatch.setattr(terminal, "_draws", lambda: True)
-    with terminal.progress_bar("searching"):
-        terminal.inform_in_passing("period 0.01 s: settled")
+    terminal.inform_in_passing("period 0.01 s: settled")
+    monkeypatch.setattr(terminal, "_BARS", [beside.append])
     terminal.inform_in_passing("period 0.02 s: settled")
-    assert printed == ["period 0.02 s: settled"]
+    assert (printed, beside) == ([], ["period 0.02 s: settled"])

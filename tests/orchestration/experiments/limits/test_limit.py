@@ -161,6 +161,14 @@ def test_the_own_value_is_scanned_unless_the_start_is_given() -> None:
     assert search_range(varied, {}, first=0.001, last=None, tolerance=None, scan=None).own is None
 
 
+@pytest.mark.parametrize(("share", "last"), [(1.0, 5.0), (0.2, 1.0)])
+def test_a_delay_of_many_periods_is_searched_well_beyond_what_the_file_has(share: float, last: float) -> None:
+    varied = Varied(request=example("dc_servo", {"connections.command.delay": 0.5}), of="connections.command.delay")
+    span = search_range(varied, {}, first=None, last=None, tolerance=None, scan=None, share=share)
+    assert (span.own, span.step, span.last) == pytest.approx((0.5, 0.05, last))
+    assert len(span.values()) <= 101
+
+
 def test_steps_finer_than_the_tolerance_are_not_taken() -> None:
     tried = []
 
