@@ -568,7 +568,8 @@ BEHAVIOUR = (
         damage_3=fault("exits"),
     ),
     Mutant(
-        name="process crashes", rule="process", words=("SIGSEGV" if sys.platform != "win32" else "exit code", "runs"),
+        name="process crashes", rule="process",
+        words=("SIGSEGV" if sys.platform != "win32" else "exit code", "runs, after t = 0 s"),
         damage=source("plant_fmu/slave.py", _STEP, f"__import__('ctypes').string_at(0)\n        {_STEP}"),
         versions=(2,),
     ),

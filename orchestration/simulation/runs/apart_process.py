@@ -3,6 +3,7 @@
 import logging
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,6 +65,7 @@ class _Reporter(logging.Handler):
 
 def main(folder: str) -> None:
     """Run what is ordered."""
+    tempfile.tempdir = folder  # what FMUs are unpacked in goes with it, however this process ends
     parent = Parent(interrupt=signal.default_int_handler)
     order: Order = parent.receive()
     reporter = _Reporter(parent)

@@ -20,6 +20,8 @@ from orchestration.components.fmi.trust import content_hash, is_own_content
 from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.processes import subprocesses
 from orchestration.foundation.processes.child import Child, Died
+from orchestration.simulation.runs.outcome import RunLost
+from orchestration.simulation.runs.simulation import run
 from orchestration.simulation.workers import task as tasks
 from orchestration.simulation.workers.provenance import sources, versions
 from orchestration.simulation.workers.row import Outcome, Results
@@ -124,9 +126,8 @@ class Supervisor:
                 else:
                     crashes += 1
                 if crashes == ATTEMPTS:
-                    return self._failed(
-                        f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
-                    )
+                    tried = f"its worker process {death}, {ATTEMPTS} times, the last times in a new process"
+                    return self._failed(self._lost_alone(task) or tried)
                 if killed == ATTEMPTS:
                     first = task.index if isinstance(task, tasks.RunTask) else task.index[0]
                     raise QuadcosimError(
@@ -168,6 +169,27 @@ class Supervisor:
             message = answer.message
         raise tasks.WorkerEnvironmentError(f"not a failure of a run: {message}")
 
+    def _lost_alone(self, task: tasks.RunTask | tasks.TaskBatch) -> str | None:
+        """How a run by itself ends that has ended its workers: the process, in whose call, and when; None: otherwise.
+
+        Only third-party FMUs have a process of their own then.
+        """
+        alone = task if isinstance(task, tasks.RunTask) else task.alone(0)
+        if all(self._is_own(Path(component.fmu)) for component in alone.system.components.values()):
+            return None
+        try:
+            run(alone.system, engine=alone.engine, time_limit=alone.time_limit, progress=self._expect_open)
+        except RunLost as lost:
+            return str(lost)
+        except QuadcosimError:
+            self._expect_open()
+        return None
+
+    def _expect_open(self, share: float = 0.0) -> None:
+        """Raise `QuadcosimError` once this is closed."""
+        if self._closed:
+            raise QuadcosimError("the sweep has ended")
+
     def _is_own(self, fmu: Path) -> bool:
         with contextlib.suppress(OSError):  # it is no longer there
             return content_hash(fmu) in self._inputs.own_fmus
@@ -192,8 +214,7 @@ class Supervisor:
         """The worker process, started if there is none; raises `QuadcosimError` if none can be started."""
         for attempt in range(ATTEMPTS):
             with self._lock:
-                if self._closed:
-                    raise QuadcosimError("the sweep has ended")
+                self._expect_open()
                 if self._worker is not None:
                     return self._worker
                 self._worker = worker = WorkerProcess(self._root)

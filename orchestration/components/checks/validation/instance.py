@@ -22,6 +22,9 @@ Values: TypeAlias = Mapping[str, Value]
 Row: TypeAlias = dict[str, Value]
 """Values by the names of the variables"""
 
+Beat: TypeAlias = Callable[..., None]
+"""Called when a call of the FMU begins or returns, and before a step with its time [s]"""
+
 _CONVERT: Mapping[str, Callable[[float], Value]] = {
     "Real": float,
     "Integer": int,
@@ -39,7 +42,7 @@ class CheckedInstance(NativeInstance):
     Errors of its calls name the function without the instance.
     """
 
-    def __init__(self, model: Model, folder: Path, name: str, beat: Callable[[], None]) -> None:
+    def __init__(self, model: Model, folder: Path, name: str, beat: Beat) -> None:
         self._beat = beat
         self._transfers: dict[tuple[str, tuple[str, ...]], tuple[Floats, Transfer]] = {}
         beat()
@@ -67,6 +70,7 @@ class CheckedInstance(NativeInstance):
 
     def advance(self, t: float, h: float) -> bool:
         """Step from `t` to `t + h` seconds; False if the FMU ends the run."""
+        self._beat(t)
         try:
             self.step(t, h)
         except StoppedStepError as stopped:
@@ -241,7 +245,7 @@ class CheckedModel3(_CheckedModel, Adapted3):
         return self._sizes()
 
 
-def instance_of(model: Model, folder: Path, name: str, beat: Callable[[], None]) -> CheckedInstance:
+def instance_of(model: Model, folder: Path, name: str, beat: Beat) -> CheckedInstance:
     """A fresh instance of the FMU unpacked in `folder`; raises `SimulatorError`."""
     if model.interface == "model-exchange":
         return (CheckedModel2 if model.version == 2 else CheckedModel3)(model, folder, name, beat)

@@ -1,7 +1,7 @@
 """Rules on interfaces beside the first that an FMU offers, on its clocks and partitions, and on FMUs of FMI 1.0."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 
 from orchestration.components.checks.validation.excitation import inputs_at
 from orchestration.components.checks.validation.finding import Note
+from orchestration.components.checks.validation.instance import Beat
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.fmi.access import SCHEDULED, Access
 from orchestration.components.fmi.adapted import adapted
@@ -37,7 +38,7 @@ class Trials:
     """Start time and communication step of its experiment [s]"""
     budget: float
     """Time for the whole validation [s]"""
-    beat: Callable[[], None]
+    beat: Beat
 
     def rows(self, model: Model) -> list[Floats]:
         """The numeric outputs after initialisation and after each step, while the inputs move."""
@@ -57,7 +58,7 @@ class Trials:
                 rows.append(outputs.copy())
                 if k >= MIN_STEPS and own_clock() - started > SHARE * self.budget:
                     break
-                self.beat()
+                self.beat(self.start + k * period)
                 given[:] = [float(value) for value in inputs_at(inputs, k).values()]
                 write()
                 try:
@@ -81,7 +82,7 @@ def _begin(instance: NativeInstance, step: float) -> float:
     return period
 
 
-def trials_of_fmi1(model: Model, budget: float, beat: Callable[[], None]) -> Trials:
+def trials_of_fmi1(model: Model, budget: float, beat: Beat) -> Trials:
     """Those of an FMU of FMI 1.0 by its default experiment; without one for a second."""
     experiment = model.description.defaultExperiment
     start = float(getattr(experiment, "startTime", None) or 0.0)

@@ -3,7 +3,7 @@
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from orchestration.components.checks.validation.excitation import (
     moved,
 )
 from orchestration.components.checks.validation.fmu import Fmu, is_clocked
-from orchestration.components.checks.validation.instance import CheckedInstance, Row, Value, instance_of
+from orchestration.components.checks.validation.instance import Beat, CheckedInstance, Row, Value, instance_of
 from orchestration.components.checks.validation.memory import in_use, other_contents
 from orchestration.components.checks.validation.run_comparison import deviations, difference
 from orchestration.components.fmi.read_description import Model, Variable
@@ -55,8 +55,7 @@ class Probe:
     folder: Path
     budget: float
     """Time for the whole validation [s]"""
-    beat: Callable[[], None] = lambda: None
-    """called when a call of the FMU begins or returns"""
+    beat: Beat = lambda *_: None
     _numbers: Iterator[int] = field(default_factory=itertools.count)
 
     def instance(self) -> CheckedInstance:

@@ -32,12 +32,12 @@ class Reporter:
         """A rule begins."""
         self._send(("begin", rule))
 
-    def beat(self) -> None:
-        """A call of the FMU begins or has returned."""
+    def beat(self, reached: float | None = None) -> None:
+        """A call of the FMU begins or has returned; it begins a step at the time `reached` [s], if that is given."""
         now = time.monotonic()
-        if now >= self._next:
+        if now >= self._next or reached is not None:
             self._next = now + _BEAT
-            self._send(("beat",))
+            self._send(("beat", reached))
 
     def finding(self, text: str) -> None:
         """The rule has a finding."""
@@ -93,6 +93,8 @@ class ReceivedReport:
         """Place where its C crashed; empty: it has not, or no line is known"""
         self.last_beat: float | None = None
         """Time at which a call of the FMU last began or returned, by the clock; None if there was none"""
+        self.reached: float | None = None
+        """Time at which the FMU began its last step in this rule [s]; None if there was none"""
         self._clock = clock
 
     def receive(self, frame: Frame) -> None:
@@ -101,11 +103,12 @@ class ReceivedReport:
 
     def begin(self, rule: str) -> None:
         """A rule begins."""
-        self.rule = rule
+        self.rule, self.reached = rule, None
 
-    def beat(self) -> None:
-        """A call begins or has returned."""
+    def beat(self, reached: float | None) -> None:
+        """A call begins or has returned, or a step begins at a time."""
         self.last_beat = self._clock()
+        self.reached = self.reached if reached is None else reached
 
     def finding(self, text: str, note: bool) -> None:
         """The rule has a finding."""

@@ -48,6 +48,8 @@ def _of_ending(received: ReceivedReport, ending: Ending, silent: float | None, l
     `silent`: seconds of the process's time since a call of the FMU began or returned; None if there was none.
     """
     moment = "after the last rule" if received.ended else f"in {received.rule or 'reading'}"
+    if received.reached is not None and not received.ended:
+        moment = f"{moment}, after t = {received.reached:g} s"
     if ending.code is None:
         hangs = silent is not None and silent > _HANGS * limits.time
         why = ""

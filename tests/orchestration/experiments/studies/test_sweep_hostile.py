@@ -23,7 +23,7 @@ NOTHING, EXITS, PICKLE, ROW, ENVIRONMENT, FILES, MEMORY, AFTER = map(float, rang
 """Gains at which the FMU does nothing, ends its process, writes a frame, or lowers a limit"""
 NO_MESSAGE = "it was ended: it sends what is no message of quadcosim"
 FAILED = {
-    EXITS: "its worker process ended with exit code 0, 3 times, the last times in a new process",
+    EXITS: "the process of the run ended with exit code 0, in a call of it (Small), after t = 0.05 s of 0.1 s",
     PICKLE: NO_MESSAGE,
     ROW: NO_MESSAGE,
     ENVIRONMENT: NO_MESSAGE,

@@ -149,10 +149,12 @@ def test_a_run_that_ends_its_process_fails_and_no_other_run_does(tmp_path: Path,
     rows = bits(summary.path)
     assert [row["design_index"] for row in rows if row["status"] == "failed"] == [1]
     assert [row["message"].partition(",")[0] for row in rows if row["status"] == "failed"] == [
-        "its worker process ended by SIGABRT"
+        "the process of the run ended by SIGABRT"
     ]  # fmt: skip
     assert (summary.failed, len(told)) == (1, 1)
-    assert told[0].startswith("run 1 (plant.mass = 1.11) failed: its worker process ended by SIGABRT, 3 times")
+    assert told[0].startswith(
+        "run 1 (plant.mass = 1.11) failed: the process of the run ended by SIGABRT, in a call of plant ("
+    )
 
 
 def test_a_run_that_is_killed_repeatedly_stops_the_sweep_without_a_row(tmp_path: Path) -> None:
