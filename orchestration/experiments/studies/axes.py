@@ -15,6 +15,7 @@ from orchestration.simulation.figures import cells
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity, quantity, unit_known
 from orchestration.systems.system.distribution import is_table
+from orchestration.systems.system.requirements import is_number
 
 Value = Scalar
 Scale = Literal["linear", "logarithmic"]
@@ -66,6 +67,11 @@ class Axis:
             raise UsageError(f"axis {self.name}: expected values of one kind: numbers, texts, or true and false")
         if self.values is None:
             _check_range(self.name, self.low, self.high, self.scale)
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether its values are numbers, not names."""
+        return self.values is None or all(map(is_number, self.values))
 
     def at(self, share: float) -> float:
         """The value at `share` in [0, 1] of the range."""

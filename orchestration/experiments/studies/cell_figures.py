@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from orchestration.experiments.studies.axes import SCALES, Axis, Value, name_of, quantity_of
+from orchestration.experiments.studies.axes import SCALES, Axis, name_of, quantity_of
 from orchestration.experiments.studies.shares import (
     GOOD,
     TwoLaws,
@@ -37,6 +37,8 @@ MAX_LETTERS = 120
 """Most letters of a row of cells, over all panels, with a space after each: more do not fit into a figure"""
 MAX_TICKS = 108, 12
 """Most letters of the ticks below a row of panels, and most ticks beside a panel"""
+MAX_PANELS = 9
+"""Most values of a third axis of numbers: a map for each, three in a row"""
 OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{} • −"
 """Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
 
@@ -61,7 +63,7 @@ def cell_lines(
     names = _names(axis, laws)
     found = cells_of(table, names)
     shown = found if metric == GOOD else medians_of(table, names, metric).rename(columns={"median": "value"})
-    groups = _by_law(shown, laws)
+    groups = _by_value(shown, laws, units)
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
@@ -78,7 +80,9 @@ def cell_lines(
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
     panel.set(
-        xlabel=across.title, ylabel=_title(metric, words, units, numbered=metric != GOOD), xscale=SCALES[axis.scale]
+        xlabel=across.title,
+        ylabel=_title(metric, words, units, numbered=metric != GOOD, repeats=True),
+        xscale=SCALES[axis.scale],
     )
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
@@ -94,7 +98,7 @@ def cell_lines(
 def cell_maps(
     table: "pd.DataFrame",
     axes: tuple[Axis, Axis],
-    laws: Axis | None,
+    third: Axis | None,
     metric: str,
     words: tuple[str, str],
     *,
@@ -103,15 +107,18 @@ def cell_maps(
 ) -> Figure:
     """The share of good runs, or the median of a metric, over two axes; the line is where half of the runs are good.
 
-    `laws` is an axis of names, such as controllers: a panel for each, and for two of them one of their difference, with
-    dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs that are both good.
+    There is a panel for each value of the `third` axis, numbers or names, such as controllers; and for two names one of
+    their difference, with dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs
+    that are both good.
     """
     x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
     places = (x.edges, y.edges)
-    found = cells_of(table, _names(*axes, laws), metric)
-    groups = _by_law(found, laws)
-    count = 3 if len(groups) == 2 else len(groups)
-    columns = min(count, 3 if style.is_wide else 1)
+    found = cells_of(table, _names(*axes, third), metric)
+    groups = _by_value(found, third, units)
+    both = _two_laws(third)
+    count = len(groups) + (both is not None)
+    columns = min(count, 3 if style.is_wide else 1 if count <= 3 else 2)
+    columns = 2 if count == 4 and columns == 3 else columns  # no row with a single panel
     rows = -(-count // columns)
     figure = style.figure(32.0 * rows + 6.0 if count == 1 else (24.0 if columns > 1 else 17.0) * rows + 6.0)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
@@ -119,7 +126,8 @@ def cell_maps(
         panel.set_visible(False)
     grids = [{name: _grid(group, axes, name) for name in ("value", "share")} for _, group in groups]
     everything = np.stack([grid["value"] for grid in grids])
-    room, most = MAX_LETTERS / columns / (len(places[0]) - 1), found["count"].max()
+    letters = min(1.0, style.width / style.font * SCREEN.font / SCREEN.width) / columns
+    room, most = MAX_LETTERS * letters / (len(places[0]) - 1), found["count"].max()
     has_room = {form: len(form.format(most, most)) + 1 <= room for form in (OF_ALL, ALONE, MARKED)}
     writes, repeats = has_room[ALONE], most > 1
     for panel, (law, group), grid in zip(panels, groups, grids):
@@ -135,11 +143,11 @@ def cell_maps(
     for panel, none_good in zip(panels, empty):
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
     if filled is not None:
-        title = _title(metric, words, units, numbered=writes and repeats and not (metric == GOOD and has_room[OF_ALL]))
+        numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
+        title = _title(metric, words, units, numbered=numbered, repeats=repeats)
         figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
-    if laws is not None and len(groups) == 2:
-        first, second = map(str, laws.values or ())
-        both, names = TwoLaws(laws.name, first, second), _names(*axes, laws)
+    if both is not None:
+        names = _names(*axes, third)
         if metric == GOOD:
             of_pairs, of = differences_of(table, names, both), "difference of the shares"
         else:
@@ -155,20 +163,21 @@ def cell_maps(
         panel.xaxis.set_tick_params(labelbottom=True)
         mesh.name_cells(panel, *(each.shown if each.is_even else None for each in (x, y)))
         if not x.is_even:
-            panel.set_xticks(*x.ticks(MAX_TICKS[0] / columns / (x.longest + 1)))
+            panel.set_xticks(*x.ticks(MAX_TICKS[0] * letters / (x.longest + 1)))
         if not y.is_even:
             panel.set_yticks(*y.ticks(MAX_TICKS[1]))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
     excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
-    dots = f"; dots: {excludes} excludes 0" if len(groups) == 2 else ""
+    dots = f"; dots: {excludes} excludes 0" if both is not None else ""
     repetitions = _repetitions(found, metric)
     style.set_title(figure, repetitions and repetitions + dots)
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):
-        handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=f"half of the runs {words[0]}"))
+        label = f"{'half of the runs' if repeats else 'limit of what is'} {words[0]}"
+        handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=label))
     if np.isfinite(np.stack(empty)).any():
-        handles.append(Patch(color=NOT_GOOD, label=f"none {words[0]}"))
+        handles.append(Patch(color=NOT_GOOD, label=f"{'none' if repeats else 'not'} {words[0]}"))
     if any(np.isnan(grid["share"]).any() for grid in grids):
         handles.append(mesh.hatched())
     if handles:
@@ -202,15 +211,21 @@ def _names(*axes: Axis | None) -> list[str]:
     return [axis.name for axis in axes if axis is not None]
 
 
-def _by_law(table: "pd.DataFrame", laws: Axis | None) -> "list[tuple[str, pd.DataFrame]]":
-    """The cells of each law in the order of the axis, with its name; without an axis of laws all of them."""
-    if laws is None:
+def _by_value(table: "pd.DataFrame", axis: Axis | None, units: Mapping[str, str]) -> "list[tuple[str, pd.DataFrame]]":
+    """The cells of each value of an axis, with its name: of laws in their order; without an axis all of them."""
+    if axis is None:
         return [("", table)]
-    return [(_law(value), table[table[laws.name] == value]) for value in laws.values or ()]
+    of, values = quantity_of(axis, units), axis.values or ()
+    named = {value: str(value).rpartition("/")[2] for value in values}
+    if axis.is_numeric:
+        named = {value: f"{of.name} {of.text_of(float(value))}" for value in sorted(map(float, values))}
+    return [(name, table[table[axis.name] == value]) for value, name in named.items()]
 
 
-def _law(value: Value) -> str:
-    return str(value).rpartition("/")[2]
+def _two_laws(axis: Axis | None) -> TwoLaws | None:
+    if axis is None or axis.is_numeric or len(axis.values or ()) != 2:
+        return None
+    return TwoLaws(axis.name, *map(str, axis.values or ()))
 
 
 def _grid(table: "pd.DataFrame", axes: tuple[Axis, Axis], column: str) -> Floats:
@@ -294,11 +309,12 @@ def _difference(
         panel.plot(*places_of_dots, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
 
 
-def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool) -> str:
+def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool, repeats: bool) -> str:
     number = ", and their number" if numbered else ""
     if metric == GOOD:
         return f"share of {words[0]} runs{number}"
-    return f"median of {labels.metric_with_unit(metric, units.get(metric))},\nwhere {words[0]}{number}"
+    median = "median of " if repeats else ""
+    return f"{median}{labels.metric_with_unit(metric, units.get(metric))},\nwhere {words[0]}{number}"
 
 
 def _repetitions(cells: "pd.DataFrame", metric: str) -> str:

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
-from orchestration.experiments.studies.axes import Axis, unit_points
-from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
+from orchestration.experiments.studies.axes import unit_points
+from orchestration.experiments.studies.cell_figures import MAX_PANELS, cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
 from orchestration.experiments.studies.shares import BOOLEAN, GOOD, judged_by, with_chance
@@ -24,7 +24,6 @@ from orchestration.foundation.basics.terminal import Share, warn
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.objectives import bound_of, judged_objective
-from orchestration.systems.system.requirements import is_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,26 +94,33 @@ def _over_axes(
 ) -> dict[str, Figure]:
     system = study.origin
     words = system.criterion.outcomes
-    axes = tuple(axis for axis in study.cell_axes if _is_numeric(axis))
-    named = [axis for axis in study.cell_axes if not _is_numeric(axis)]
+    axes = tuple(axis for axis in study.cell_axes if axis.is_numeric)
+    named = [axis for axis in study.cell_axes if not axis.is_numeric]
+    third = (*named, *axes[2:])
+    fits = all(axis.values is not None for axis in axes) and all(len(a.values or ()) <= MAX_PANELS for a in axes[2:])
     if study.repeat is not None or named or metric == GOOD:
-        listed = all(axis.values is not None for axis in axes)
-        if len(named) > 1 or not 1 <= len(axes) <= 2 or not listed:
+        if not axes or not fits or len(third) > 1:
             raise UsageError(
-                f"{study.name}: expected one or two axes of numbers with values, at most one of names, "
+                f"{study.name}: expected one or two axes of numbers with values, at most one of names or a third of "
+                f"numbers (up to {MAX_PANELS}, a map for each: it is the one listed last), "
                 "and design.repeat for the axis of repetitions, to draw; export --table prints the cells over any axes "
                 "with values, report shows all runs, and compare draws shares over random initial conditions"
             )
-        laws, table, of = named[0] if named else None, with_chance(table, study), metric
+        panels, table, of = third[0] if third else None, with_chance(table, study), metric
         if metric in BOOLEAN:
             table, of = judged_by(table, metric), GOOD
             words = words if metric == GOOD else (labels.metric(metric), f"not {labels.metric(metric)}")
         if len(axes) == 1:
-            return {metric: cell_lines(table, axes[0], laws, of, words, units=units, style=style)}
-        both = (axes[0], axes[1])
-        return {f"{metric}_map": cell_maps(table, both, laws, of, words, units=units, style=style)}
+            return {metric: cell_lines(table, axes[0], panels, of, words, units=units, style=style)}
+        return {f"{metric}_map": cell_maps(table, (axes[0], axes[1]), panels, of, words, units=units, style=style)}
     if len(axes) > 2:
-        return {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
+        drawn = {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
+        if len(axes) == 3 and fits and system.criterion.good is not None:
+            cells = with_chance(table, study)
+            drawn[f"{metric}_map"] = cell_maps(
+                cells, (axes[0], axes[1]), axes[2], metric, words, units=units, style=style
+            )
+        return drawn
     drawn = {metric: figures.lines(table, axes, metric, words, bound_of(system, metric), units=units, style=style)}
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
         drawn[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
@@ -153,7 +159,3 @@ def _default_metric_of(study: Study, table: "pd.DataFrame") -> str:
 
 def _is_screened(study: Study) -> bool:
     return study.method in sensitivity.METHODS and any(axis.values is None for axis in study.axes)
-
-
-def _is_numeric(axis: Axis) -> bool:
-    return axis.values is None or all(map(is_number, axis.values))

@@ -107,11 +107,25 @@ def test_sampled_axes_are_drawn_without_a_map(tmp_path: Path) -> None:
     expect_picture(picture)
 
 
-def test_more_axes_are_drawn_as_dots_over_each(tmp_path: Path) -> None:
-    chosen = invented(tmp_path, study(PERIODS, DELAYS, axis("plant.mass", 0.01, 0.02)))
-    (picture,) = draw_study(chosen, tmp_path, "ultimate_bound", PNG)
-    assert picture == tmp_path / "ultimate_bound.png"
-    expect_picture(picture)
+def test_more_axes_are_drawn_as_dots_over_each_and_three_of_a_grid_as_a_map_for_each_value_of_the_last(
+    tmp_path: Path,
+) -> None:
+    masses = axis("plant.mass", 0.02, 0.01, 0.05, 0.07)
+    chosen = invented(tmp_path, study(PERIODS, DELAYS, masses))
+    drawn, _ = study_figures(chosen, store_path(chosen.name, tmp_path), "ultimate_bound")
+    assert [*drawn] == ["ultimate_bound", "ultimate_bound_map"]
+    panels = drawn["ultimate_bound_map"].axes
+    assert [panel.get_title() for panel in panels[:4]] == [f"mass {mass} kg" for mass in (0.01, 0.02, 0.05, 0.07)]
+    assert panels[4].get_xlabel().endswith(",\nwhere settled"), "no median of one run"
+    heaviest = panels[3].collections[0].get_array()  # a row for each delay
+    assert heaviest is not None
+    assert np.ma.compressed(heaviest).tolist() == pytest.approx([0.04, 0.045, 0.0425, 0.0475, 0.045])
+    (only,) = study_figures(chosen, store_path(chosen.name, tmp_path), "good")[0]
+    assert only == "good_map"
+    many = invented(tmp_path, study(PERIODS, DELAYS, axis("plant.mass", *np.arange(1.0, 11.0))))
+    assert [*study_figures(many, store_path(many.name, tmp_path), "ultimate_bound")[0]] == ["ultimate_bound"]
+    with pytest.raises(UsageError, match="a third of numbers \\(up to 9, a map for each: it is the one listed last"):
+        study_figures(many, store_path(many.name, tmp_path), "good")
 
 
 def test_an_unknown_metric_is_reported_with_the_known_ones(tmp_path: Path) -> None:
