@@ -107,12 +107,13 @@ def tune(
     Writes a file of parameters into `out` for each period; it names `command` as its origin. Costs and results are
     kept in `folder`, default `results/NAME`: called again after an interruption, it loses the generation of points that
     it was evaluating, and ends with the same result. `progress` is called with the share
-    done, `announce` with a line for each search; None for silence.
+    done, `announce` with a line for all and one for each search; None for silence.
 
     Raises `UsageError` for an invalid tuning, `QuadcosimError` if a run fails, `KeyboardInterrupt` after Ctrl-C.
     """
     tuning = load_tuning(tuning)
     folder, announce = Path(folder or Path("results") / tuning.name), announce or (lambda line: None)
+    announce(tuning.effort)
     done: Sequence[SearchResult]
     if isinstance(tuning, Tuning):
         done = _search_by_runs(tuning, folder, workers, dask, engine, progress, announce)

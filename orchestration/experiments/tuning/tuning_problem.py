@@ -1,5 +1,6 @@
 """The tuning problem: parameters with their ranges, a cost, the search effort; and its minimisation by CMA-ES."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -39,7 +40,7 @@ class TuningProblem:
     periods: tuple[float, ...]
     """The sampling periods [s], for each of which it is tuned separately."""
     evaluations: int
-    """The number of evaluations of the cost in a search, per parameter."""
+    """The number of evaluations of the cost in a search, per parameter; rounded up to whole generations of points."""
     seeds: tuple[int, ...]
     """The seeds of the optimiser, each for a separate search; the search with the lowest cost is taken."""
 
@@ -77,9 +78,25 @@ class TuningProblem:
         raise NotImplementedError
 
     @property
+    def generation(self) -> int:
+        """Points that a search evaluates together, as many as CMA-ES has by default."""
+        return 4 + int(3.0 * math.log(max(len(self.parameters), 2)))
+
+    @property
     def budget(self) -> int:
-        """Evaluations of the cost in one search."""
-        return self.evaluations * len(self.parameters)
+        """Evaluations of the cost in one search: whole generations."""
+        return self.generation * -(-self.evaluations * len(self.parameters) // self.generation)
+
+    @property
+    def effort(self) -> str:
+        """The number of searches and their evaluations, in words."""
+        asked, searches = self.evaluations * len(self.parameters), len(self.periods) * len(self.seeds)
+        text = f"{searches} search{'es' if searches > 1 else ''} of {self.budget} evaluations of the cost each"
+        if asked == self.budget:
+            return text
+        return (
+            f"{text}: {self.evaluations} a parameter are {asked}, rounded up to whole generations of {self.generation}"
+        )
 
     def files(self) -> Files:
         """All files of the runs; missing FMUs are built."""
@@ -146,7 +163,7 @@ def minimise(
 
     size = len(tuning.parameters)
     first = np.random.default_rng(seed).uniform(0.25, 0.75, max(size, 2))  # a second one without effect: cma needs two
-    options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
+    options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9, "popsize": tuning.generation}
     strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
     best, least, count = first[:size], np.inf, 0
     while count < tuning.budget:  # no other stopping rule: every controller gets the same effort
@@ -158,7 +175,7 @@ def minimise(
         place = int(np.argmin(values))
         if values[place] < least:
             best, least = candidates[place], values[place]
-        progress(min(1.0, count / tuning.budget))
+        progress(count / tuning.budget)
     return Minimum(shares=best, cost=float(least), evaluations=count)
 
 
