@@ -23,7 +23,7 @@ from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.engines.algebraic_loops import in_words
 from orchestration.simulation.engines.resolved import resolve_with_models
 from orchestration.simulation.runs.prepared import PreparedRun, prepared
-from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.component import Component, Parameter, Sampling
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
@@ -78,6 +78,37 @@ class Start:
     """Saved states of the components, and the times of their next steps by their own clocks [s]"""
     ticking: frozenset[str]
     """Components with clocks of FMI 3.0"""
+    tunable: frozenset[str]
+    """Parameters, as COMPONENT.NAME, that may be set between steps"""
+    tuned: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
+    """Those that components take on there, as they had others when they came to rest"""
+
+    @classmethod
+    def of(cls, simulation: "PreparedRun", saved: Mapping[str, bytes]) -> "Start":
+        """That of a run which has come to rest."""
+        instances = cast("Mapping[str, TracedInstance]", simulation.instances)
+        return cls(
+            components=simulation.system.components,
+            saved={name: (state, instances[name].time) for name, state in saved.items()},
+            ticking=frozenset(name for name, one in instances.items() if one.model.ticking),
+            tunable=frozenset(
+                f"{name}.{variable.name}"
+                for name, one in instances.items()
+                for variable in one.model.variables.values()
+                if variable.variability == "tunable" and not one.has_events
+            ),
+        )
+
+    def tuned_to(self, system: System) -> "Start | None":
+        """This one with the tunable parameters of another system; None: more of its components differs."""
+        if system.components.keys() != self.components.keys():
+            return None
+        both = [(name, one.parameters, system.components[name].parameters) for name, one in self.components.items()]
+        tuned = {name: {key: new[key] for key in new if old.get(key) != new[key]} for name, old, new in both}
+        components = {name: replace(self.components[name], parameters=new) for name, _, new in both}
+        found = replace(self, components=components, tuned=tuned)
+        is_tunable = self.tunable.issuperset(f"{name}.{key}" for name, each in tuned.items() for key in each)
+        return found if is_tunable and all(o.keys() <= n.keys() for _, o, n in both) and found.serves(system) else None
 
     def serves(self, system: System) -> bool:
         """Whether the components of another system can begin there: their states hold parameters, and clocks."""
@@ -240,24 +271,27 @@ def _settled(
     models: Mapping[str, Model] | None,
     known: KnownTangents,
 ) -> Iterator[AtRest]:
-    """A system that has come to rest over some periods: from where one has that differs in timing, or by a run."""
-    kept = known.start if time_to_rest(calm) and known.start is not None and known.start.serves(calm) else None
+    """A system that has come to rest over some periods: from where one has that differs in timing, or by a run.
+
+    Where that run finds no rest, as of an unstable loop: from where one has that differs in parameters, if it stays.
+    """
+    kept = known.start if time_to_rest(calm) else None
+    starts: list[Start | None] = [kept] if kept is not None and kept.serves(calm) else []
+    tuned = None if kept is None or starts else kept.tuned_to(calm)
     with ExitStack() as stack:
-        try:
-            simulation = stack.enter_context(_rested(calm, period, instances, models, kept))
-        except NotAnEquilibriumError:
-            if kept is None:
-                raise
-            simulation = stack.enter_context(_rested(calm, period, instances, models, None))
-            kept = None
+        why: NotAnEquilibriumError | None = None
+        for start in (*starts, None, *([] if tuned is None else [tuned])):
+            try:
+                simulation = stack.enter_context(_rested(calm, period, instances, models, start))
+                break
+            except NotAnEquilibriumError as error:
+                why = error if start is None else why
+        else:
+            assert why is not None
+            raise why
         saved = {name: one.save() for name, one in simulation.instances.items()}
-        if time_to_rest(calm) and kept is None:
-            times = {name: cast("TracedInstance", one).time for name, one in simulation.instances.items()}
-            known.start = Start(
-                components=calm.components,
-                saved={name: (state, times[name]) for name, state in saved.items()},
-                ticking=frozenset(name for name, one in simulation.instances.items() if one.model.ticking),
-            )
+        if time_to_rest(calm) and start is None:
+            known.start = Start.of(simulation, saved)
         yield AtRest(simulation=simulation, saved_states=saved, extra=extra, period=period, known=known)
 
 
@@ -273,8 +307,8 @@ def start_of(calm: System, period: Fraction, instances: Instances, known: KnownT
         return None
     if known.start is None or not known.start.serves(calm):
         expect_whole_instances(calm)
-        with _settled(calm, period, instances, NO_SIGNALS, None, known):
-            pass
+        with _settled(calm, period, instances, NO_SIGNALS, None, known) as loop:
+            return Start.of(loop.simulation, loop.saved_states)
     return known.start
 
 
@@ -379,12 +413,11 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
         for k in range(SETTLED):
             if master.run(pause_at=round(begin + k * period)):
                 why = master.divergence or master.running.termination or "it was interrupted"
-                hint = (
-                    f": expected values in [operating_point] from which it comes to rest in {after:g} s"
-                    if after
-                    else ""
+                rest = f" in {after:g} s" if after else ""
+                raise NotAnEquilibriumError(
+                    f"unstable here, no rest: the run leaves the operating point: {why}: expected values in "
+                    f"[operating_point] from which it comes to rest{rest}"
                 )
-                raise UsageError(f"the run leaves the operating point: {why}{hint}")
             rows.append(master.board.row[exchanged])
         return np.array(rows)
 
@@ -417,11 +450,13 @@ def _changes_of_sources(simulation: PreparedRun, start: float, end: float) -> It
 class TracedInstance:
     """An FMU with the values last written to it, and the time of its next step, by its own clock.
 
-    It may begin in a saved state, at the time of its next step then.
+    It may begin in a saved state, at the time of its next step then, with other values of tunable parameters.
     """
 
-    def __init__(self, fmu: Instance, begins: tuple[bytes, float] | None = None) -> None:
-        self.fmu = fmu
+    def __init__(
+        self, fmu: Instance, begins: tuple[bytes, float] | None = None, tuned: Mapping[str, Parameter] | None = None
+    ) -> None:
+        self.fmu, self._tuned = fmu, tuned or {}
         self.written: dict[str, float] = {}
         self.time = self._later = 0.0
         self._begins = begins
@@ -452,6 +487,8 @@ class TracedInstance:
             saved, time = self._begins
             self.fmu.exit_initialization()
             self.fmu.restore(saved)
+            for name, value in self._tuned.items():
+                self.fmu.set(name, value)
             self._later = time - start
 
     def exit_initialization(self) -> None:
@@ -468,8 +505,11 @@ class TracedInstance:
 
 def tracing_loader(instances: Instances, start: Start | None = None) -> Loader:
     """A loader of instances as `TracedInstance`, which may begin where a system has come to rest."""
-    saved: Mapping[str, tuple[bytes, float]] = {} if start is None else start.saved
-    return wrapping_loader(instances.load, lambda fmu: TracedInstance(fmu, saved.get(fmu.name)))
+    if start is None:
+        return wrapping_loader(instances.load, TracedInstance)
+    return wrapping_loader(
+        instances.load, lambda fmu: TracedInstance(fmu, start.saved.get(fmu.name), start.tuned.get(fmu.name))
+    )
 
 
 def wrapping_loader(of: Loader, wrapper: Callable[[Instance], object]) -> Loader:

@@ -138,8 +138,8 @@ def expect_rest(
             f"{text}, and by {by_half} after half of that: expected a longer {AFTER} in [operating_point]"
         )
     raise NotAnEquilibriumError(
-        f"{text}, no less than after half of that, as a loop that is unstable or oscillates: expected one that "
-        f"settles, or a longer {AFTER} in [operating_point], or without it values at which the system rests"
+        f"{text}, no less than after half of that: unstable here, or an oscillation, no rest: expected a loop that "
+        f"settles, or without {AFTER} values in [operating_point] at which the system rests"
     )
 
 

@@ -65,6 +65,16 @@ def test_other_delays_begin_where_the_own_one_has_come_to_rest_also_where_the_lo
         linearise(changed(servo, {DELAY_PATH: 0.02}))
 
 
+def test_gains_that_are_unstable_have_poles_where_the_own_one_rests_if_they_rest_there_too(servo: System) -> None:
+    """The gain does not move the rest. Where the own one has come to none either, that is said."""
+    gain = "components.controller.parameters.K"
+    (crossing,) = locus(servo, gain, first=0.96, last=4.0, count=3).crossings
+    (given,) = locus(native_example("dc_servo"), gain, first=0.96, last=4.0, count=3).crossings
+    assert crossing.value == pytest.approx(given.value, rel=1e-6)
+    with pytest.raises(UsageError, match=rf"{gain} = 4: .*unstable here"):
+        locus(dataclasses.replace(servo, operating_point={"after": 0.01}), gain, first=0.96, last=4.0, count=2)
+
+
 def test_twin_runs_begin_at_the_same_rest(servo: System) -> None:
     """Other parameters come to rest anew, for a saved state holds them."""
     with closing(Instances()) as instances:
@@ -84,7 +94,7 @@ def test_twin_runs_begin_at_the_same_rest(servo: System) -> None:
         ({AFTER: 0.5}, r"not at rest after 0.5 s: \S+ moves by .* in 5 periods, and by .*: expected a longer after"),
         (
             {AFTER: 0.5, "components.controller.parameters.K": 3.4},
-            "no less than after half of that, as a loop that is unstable or oscillates",
+            "no less than after half of that: unstable here, or an oscillation, no rest: expected a loop",
         ),
         ({AFTER: -1.0}, r"operating_point.after = -1.0: expected a time"),
         ({AFTER: "soon"}, r"operating_point.after = soon: expected a time"),
