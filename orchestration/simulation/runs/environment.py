@@ -9,7 +9,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
 from orchestration.foundation.basics.errors import UsageError, expected_name, shown
-from orchestration.foundation.basics.simulator import Booleans, Floats
+from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.simulation.runs.arguments import function_in, names_in, values_by_path
 from orchestration.simulation.runs.stepped_runs import SteppedRuns
@@ -59,10 +59,15 @@ class Environment(gymnasium.Env[Floats, Floats]):  # type: ignore[misc]
         self.observation_space = _observations(self.simulation.measured, self._observe)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode; `options` are values by path on top of those that `starts` draws."""
+        """Begin an episode; `options` are values by path on top of those that `starts` draws.
+
+        `info["values"]` has all of these, and the `seed` of the episode: `fly` takes them, to fly it again.
+        """
         super().reset(seed=seed)
-        values, seed_of_episode = _episode(self.np_random, self._starts)
-        return self._with_others(self.simulation.reset(seed_of_episode, {**values, **_options(options)})), {}
+        drawn, seed_of_episode = _episode(self.np_random, self._starts)
+        values = {**drawn, **_options(options)}
+        observation = self._with_others(self.simulation.reset(seed_of_episode, values))
+        return observation, {"values": {**values, "seed": seed_of_episode}}
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Go on to the next sample; returns observation, reward, whether terminated or truncated, and `info`."""
@@ -138,7 +143,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
         """Begin an episode in each; a number as `seed` is that of the first, one more for each that follows.
 
         `options` are values by path on top of those that `starts` draws: one for all, or an array with one for each.
-        They hold for the episodes that this begins, not for those that begin by themselves later.
+        They hold for the episodes that this begins, not for those that begin by themselves later. `info["values"]` has
+        the values of each episode as `Environment` has them, an array by path, with a mask by `_path`.
         """
         seeds = self._seeds(seed)
         if not self._random:
@@ -146,11 +152,14 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
         for i, own in enumerate(seeds):
             if own is not None:
                 self._random[i] = seeding.np_random(own)[0]
-        self._begin(np.arange(self.num_envs), _options(options))
-        return self._observation(), {}
+        info = self._begin(np.arange(self.num_envs), _options(options))
+        return self._observation(), info
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, Booleans, Booleans, dict[str, Any]]:
-        """Go on to the next samples; raises `UsageError` for actions that are not finite, and before `reset`."""
+        """Go on to the next samples; `info` has the values of episodes that begin here, as `reset` has them.
+
+        Raises `UsageError` for actions that are not finite, and before `reset`.
+        """
         if not self._random:
             raise UsageError("step: no run is under way; expected reset before it")
         actions = _numbers(actions)
@@ -158,14 +167,13 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
             raise UsageError(f"actions: expected finite numbers, shape {self.action_space.shape}")
         fresh = self.runs.over.copy()
         self.runs.step(actions)
-        if fresh.any():
-            self._begin(np.flatnonzero(fresh), {})
+        info = self._begin(np.flatnonzero(fresh), {}) if fresh.any() else {}
         value = self._reward(_Values(self.runs))
         rewards = _numbers(value)
         if rewards.shape != (self.num_envs,):
             raise UsageError(f"reward: returned {shown(repr(value))}; expected an array of {self.num_envs} numbers")
         terminated = self.runs.diverged.copy()
-        return self._observation(), np.where(fresh, 0.0, rewards), terminated, self.runs.over & ~terminated, {}
+        return self._observation(), np.where(fresh, 0.0, rewards), terminated, self.runs.over & ~terminated, info
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         """The seed of each environment; None: it goes on with its random numbers."""
@@ -176,13 +184,23 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Floats, Floats, Any]):  # typ
             raise UsageError(f"seed = {shown(repr(seed))}: expected a whole number, or a list of {self.num_envs}")
         return seeds
 
-    def _begin(self, places: Any, options: Mapping[str, Any]) -> None:
+    def _begin(self, places: Integers, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Begin episodes at some places; their values, in the form that Gymnasium has of many environments."""
         drawn, seeds = zip(*(_episode(self._random[place], self._starts) for place in places.tolist()))
         for each in drawn:
             if each.keys() != drawn[0].keys():
                 raise UsageError(f"starts: returned {[*each]} and {[*drawn[0]]}: expected the same paths in each call")
         values = {path: np.array([each[path] for each in drawn]) for path in drawn[0]}
         self.runs.begin(places, seeds, {**values, **options})
+        begun = np.zeros(self.num_envs, dtype=np.bool_)
+        begun[places] = True
+        info: dict[str, Any] = {}
+        for path, some in {**values, **options, "seed": seeds}.items():
+            found = np.asarray(some)
+            info[path] = np.zeros(self.num_envs, dtype=found.dtype if found.dtype.kind in "biuf" else object)
+            info[path][places] = found
+            info[f"_{path}"] = begun.copy()
+        return {"values": info, "_values": begun}
 
     def _observation(self) -> Floats:
         others = [self.runs.value(name) for name in self._observe]

@@ -52,8 +52,11 @@ def test_gymnasiums_checker_passes_it() -> None:
 
 
 def test_an_episode_is_a_run_of_its_seed_and_start(environment: Any) -> None:
-    first, _ = environment.reset(seed=3)
+    first, info = environment.reset(seed=3)
     again, _ = environment.reset(seed=3)
+    assert [*info["values"]] == [X, "seed"]
+    start = quadcosim.fly(SHORT, info["values"], outputs=[], record=["plant.position"])
+    assert start["plant.position.x"][0] == info["values"][X], "what was drawn, which fly takes"
     other, _ = environment.reset()
     assert first.tobytes() == again.tobytes() != other.tobytes()
     rewards, over = [], False
@@ -122,11 +125,15 @@ def test_environments_in_lanes_have_the_episodes_of_each_alone(initial: Any) -> 
     assert isinstance(many, gym.VectorEnvironment)
     assert many.observation_space == each.observation_space
     assert many.metadata["autoreset_mode"] == each.metadata["autoreset_mode"]
-    np.testing.assert_array_equal(many.reset(seed=3)[0], each.reset(seed=3)[0])
+    (begun, values), (same, others) = many.reset(seed=3), each.reset(seed=3)
+    np.testing.assert_array_equal(begun, same)
+    np.testing.assert_equal(values, others)
+    assert values["values"][X].shape == (6,)
     actions, ends = np.random.default_rng(0), []
     for _ in range(14):
         action = actions.uniform(LOW, HIGH, (6, 4))
-        (observed, got, *over, _), (expected, rewards, *ended, _) = many.step(action), each.step(action)
+        (observed, got, *over, info), (expected, rewards, *ended, others) = many.step(action), each.step(action)
+        np.testing.assert_equal(info, {name: some for name, some in others.items() if "metrics" not in name})
         np.testing.assert_array_equal(observed, expected)
         np.testing.assert_array_equal(got, rewards)
         np.testing.assert_array_equal(over, ended)
