@@ -165,16 +165,16 @@ class Branching:
         elif event.kind == "sample":
             yield from self._sample(branch, event.of, event.place)
         else:  # a message from continuous time, measured or posted
+            link = self.links[event.of]
             for lost, likely in self._losses(branch, event.of):
-                if lost:
+                if lost and not link.is_repeatable:
                     yield likely
                 elif event.kind == "measure":
-                    link = self.links[event.of]
                     yield self._put_in_transit(likely, BranchEvent(
                         branch.time + event.place, SAMPLES, 2 * (link.receiver or 0), "arrive", event.of, link.size
-                    ))  # fmt: skip
+                    ), again=lost)  # fmt: skip
                 else:
-                    yield from self._send(likely, event.of, event.place)
+                    yield from self._send(likely, event.of, event.place, again=lost)
 
     def _sample(self, branch: Branch, task: int, place: int) -> Iterator[Branch]:
         branches = [branch]
@@ -190,7 +190,7 @@ class Branching:
                     after
                     for b in branches
                     for lost, each in self._losses(b, i)
-                    for after in ([each] if lost else self._send(each, i, place))
+                    for after in ([each] if lost and not link.is_repeatable else self._send(each, i, place, again=lost))
                 ]
         yield from branches
 
@@ -209,8 +209,8 @@ class Branching:
             found.append((lost, replace(_likely(branch, probability), bursts=bursts)))
         return found
 
-    def _send(self, branch: Branch, i: int, place: int) -> Iterator[Branch]:
-        """A message that is not lost."""
+    def _send(self, branch: Branch, i: int, place: int, *, again: bool) -> Iterator[Branch]:
+        """A message that is not lost; or the one before, again."""
         link = self.links[i]
         transit_time = link.transit_times[place]
         if transit_time is None:
@@ -220,13 +220,13 @@ class Branching:
         if link.jacobi and link.sender is not None:
             sent = next((x.time for x in branch.events if x.kind == "sample" and x.of == link.sender), None)
         if sent is None:
-            yield self._put_in_transit(branch, BranchEvent(NEVER, ARRIVES, i, "wait", i, link.size))
+            yield self._put_in_transit(branch, BranchEvent(NEVER, ARRIVES, i, "wait", i, link.size), again=again)
             return
         for arrival, likely in self._arrivals(branch, i, sent):
             if arrival == branch.time and not link.settles:
-                yield self._deliver_now(likely, i)
+                yield likely if again else self._deliver_now(likely, i)
             else:
-                yield self._put_in_transit(likely, self._arrival(i, arrival))
+                yield self._put_in_transit(likely, self._arrival(i, arrival), again=again)
 
     def _arrivals(self, branch: Branch, i: int, sent: int) -> Iterator[tuple[int, Branch]]:
         """Arrival times of a message sent at a time: none overtakes another."""
@@ -235,9 +235,15 @@ class Branching:
         for late, p in link.delay_jitter.draws(sent + link.delay, self._kinks_between, self._order):
             yield max(sent + link.delay + late, last), _likely(branch, p)
 
-    def _put_in_transit(self, branch: Branch, arrival: BranchEvent) -> Branch:
-        before = branch.events[: place_in(branch.events, arrival)]
-        piece = self._effects.send(branch.piece, arrival.of, sum(event.size for event in before))
+    def _put_in_transit(self, branch: Branch, arrival: BranchEvent, *, again: bool) -> Branch:
+        i, events = arrival.of, branch.events
+        at = sum(event.size for event in events[: place_in(events, arrival)])
+        if again:
+            last = max((k for k, event in enumerate(events) if event.of == i and event.size), default=None)
+            number = None if last is None else sum(event.size for event in events[:last])
+            piece = self._effects.repeat(branch.piece, i, at, number)
+        else:
+            piece = self._effects.send(branch.piece, i, at)
         return replace(_planned(branch, arrival), piece=piece)
 
     def _deliver_now(self, branch: Branch, i: int) -> Branch:

@@ -178,11 +178,22 @@ class LoopEffects(ABC):
     def send(self, piece: Piece, link: int, at: int) -> Piece:
         """A message is put among the numbers of those in transit, at number `at`."""
         x = self.system.connections[link]
-        rows, size, first = self._message_rows(x), len(piece.Z), self.size + at
-        message = np.hstack([rows, np.zeros((len(rows), size - self.size))])
-        change = np.vstack([np.eye(size)[:first], message, np.eye(size)[first:]])
+        rows = self._message_rows(x)
+        message = np.hstack([rows, np.zeros((len(rows), len(piece.Z) - self.size))])
+        return self._with_message(piece, message, self._noise[x.name], at)
+
+    def repeat(self, piece: Piece, link: int, at: int, last: int | None) -> Piece:
+        """The message before is put there again: number `last` of those in transit; None: it has arrived."""
+        x = self.system.connections[link]
+        first = self.places("received", x.name).start if last is None else self.size + last
+        message = np.eye(len(piece.Z))[first : first + len(x.start)]
+        return self._with_message(piece, message, np.zeros(len(message)), at)
+
+    def _with_message(self, piece: Piece, message: Floats, variances: Floats, at: int) -> Piece:
+        first, known = self.size + at, np.eye(len(piece.Z))
+        change = np.vstack([known[:first], message, known[first:]])
         noise = np.zeros(len(change))
-        noise[first : first + len(rows)] = self._noise[x.name]
+        noise[first : first + len(message)] = variances
         return piece.mapped(change, np.diag(noise))
 
     def _message_rows(self, x: Connection) -> Floats:

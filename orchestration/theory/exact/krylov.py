@@ -11,8 +11,12 @@ Map = Callable[[Floats], Floats]
 
 SIZE, TURNS = 100, 20
 """vectors of a basis, and the number of restarts"""
+FIRST = 12
+"""vectors of the first basis of an eigenvalue: enough for a map with few"""
 EIGENVALUE, RESIDUAL = 1e-12, 1e-13
 """relative: residuals at convergence"""
+INVARIANT = 1e-13
+"""likewise, of the part of an image outside of a basis that has all images"""
 ENOUGH = 1e-10
 """likewise, where rounding prevents smaller ones"""
 
@@ -23,8 +27,8 @@ def spectral_radius_of(of: Map, start: Floats) -> float:
     It is an eigenvalue with an eigenvector in the cone: the one with the largest real part in each basis.
     """
     vector, radius, residual = start, 0.0, np.inf
-    for _ in range(TURNS):
-        basis, small, outside = _basis(of, vector)
+    for turn in range(TURNS):
+        basis, small, outside = _basis(of, vector, SIZE if turn else FIRST)
         values, vectors = np.linalg.eig(small)
         first = int(np.argmax(values.real))
         radius, share = float(values[first].real), np.real(vectors[:, first])
@@ -48,7 +52,7 @@ def solve_fixed_point(of: Map, b: Floats) -> Floats:
         norm = float(np.linalg.norm(residual))
         if norm <= RESIDUAL * max(size, float(np.linalg.norm(solution))):
             return solution
-        basis, small, outside = _basis(of, residual)
+        basis, small, outside = _basis(of, residual, SIZE)
         count = len(small)
         system = np.vstack([np.eye(count) - small, np.zeros(count)])
         system[-1, -1] = -outside
@@ -60,10 +64,10 @@ def solve_fixed_point(of: Map, b: Floats) -> Floats:
     return solution
 
 
-def _basis(of: Map, start: Floats) -> tuple[Floats, Floats, float]:
+def _basis(of: Map, start: Floats, most: int) -> tuple[Floats, Floats, float]:
     """By Arnoldi: an orthonormal basis in rows, the map in it, and the norm of the part outside of it."""
     rows = [start / np.linalg.norm(start)]
-    count = min(SIZE, len(start))
+    count = min(most, len(start))
     small: Floats = np.zeros((count + 1, count))
     for k in range(count):
         image = of(rows[k])
@@ -74,7 +78,7 @@ def _basis(of: Map, start: Floats) -> tuple[Floats, Floats, float]:
             small[: k + 1, k] += shares
             image = image - shares @ known
         small[k + 1, k] = outside = float(np.linalg.norm(image))
-        if k + 1 == count or outside <= 1e-15 * size:
+        if k + 1 == count or outside <= INVARIANT * size:
             return known, small[: k + 1, : k + 1], outside
         rows.append(image / outside)
     raise AssertionError

@@ -16,6 +16,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.theory.exact.branch import Piece
 from orchestration.theory.exact.krylov import SIZE, Map, solve_fixed_point, spectral_radius_of
+from orchestration.theory.stability.sign_changes import zero_between
 
 MAX_MOMENTS = 100_000
 """numbers in the second moments of all modes together"""
@@ -25,6 +26,8 @@ MOST_DOUBLINGS = 60
 """Most doublings of the number of periods in a sum"""
 DENSE = 1200
 """numbers up to which an operator is made a matrix"""
+GROWTH = 1e-10
+"""share of a growth factor's distance from that of the mean, to which it is found"""
 GROWN = 30
 """periods after which moments are near those that grow longest, by which states are scaled"""
 
@@ -109,7 +112,59 @@ class JumpLinear:
         """The mean-square radius: the growth factor of second moments over a period."""
         if self._deterministic_map is not None:
             return _spectral_radius(self._deterministic_map) ** 2
+        if self.numbers > DENSE and len(self._sizes[0]) == 1:
+            return self._radius_beside_mean()
         return _radius(self._propagate, self._basis)
+
+    @functools.cached_property
+    def _mean_map(self) -> Floats:
+        """The mean of the maps of the state over a period, where that begins in one mode."""
+        now = [np.eye(self._sizes[0][0])]
+        for i, stage in enumerate(self._stages):
+            later = [np.zeros((n, len(now[0].T))) for n in self._sizes[(i + 1) % len(self._sizes)]]
+            for p in stage:
+                later[p.end] += p.probability * p.piece.Z @ now[p.begin]
+            now = later
+        return now[0]
+
+    def _by_chance(self, growth: float) -> Map:
+        """The moments that chance adds to those of the mean map in all periods, each counted less by a growth.
+
+        The sum over the mean map is by doubling: a delay line of n messages, in which powers of the map end late, costs
+        log n steps. What chance adds has few dimensions, those of the messages that are lost or not.
+        """
+        mean, only = self._mean_map, self._basis.matrices
+
+        def added(numbers: Floats) -> Floats:
+            ((before,), (after,)) = only(numbers), only(self._propagate(numbers))
+            by_chance = (after - mean @ before @ mean.T) / growth
+            return self._basis.numbers([_geometric_sum(mean / math.sqrt(growth), by_chance)])
+
+        return added
+
+    def _radius_beside_mean(self) -> float:
+        """The radius: that growth at which what chance adds in all periods is as much as there was.
+
+        The radius of what is added falls, from infinity or less at the growth of the mean map.
+        """
+        least = _spectral_radius(self._mean_map) ** 2
+        scales = [np.diag(np.linalg.norm(root, axis=1)) for root in _scales(self._propagate, self._basis)]
+
+        @functools.cache
+        def below(growth: float) -> float:
+            added = spectral_radius_of(_scaled(self._by_chance(growth), self._basis, scales), self._basis.identity)
+            return 1.0 / added - 1.0 if added > 0.0 else math.inf
+
+        high = max(1.0, 2.0 * least)
+        while below(high) < 0.0:
+            high *= 2.0
+        low = high
+        while below(low) >= 0.0:
+            high, low = low, least + 0.25 * (low - least)
+            if low - least <= 1e-12 * max(least, 1e-12):
+                return least
+        found, _ = zero_between(below, lambda value: value, (low, below(low)), (high, below(high)), GROWTH)
+        return found
 
     @functools.cached_property
     def _deterministic_map(self) -> Floats | None:
@@ -127,6 +182,9 @@ class JumpLinear:
         if self._deterministic_map is not None:
             return [_geometric_sum(self._deterministic_map, first[0])]
         added = self._basis.numbers(first)
+        if self.numbers > DENSE and len(first) == 1:
+            of_mean = self._basis.numbers([_geometric_sum(self._mean_map, first[0])])
+            return self._basis.matrices(solve_fixed_point(self._by_chance(1.0), of_mean))
         if self.numbers > DENSE:
             return self._basis.matrices(solve_fixed_point(self._propagate, added))
         operator = np.array([self._propagate(unit) for unit in np.eye(self.numbers)]).T
@@ -195,7 +253,7 @@ def _geometric_sum(turn: Floats, added: Floats) -> Floats:
 def _radius(propagate: Map, basis: "_SymmetricBasis") -> float:
     if basis.count > SIZE:
         try:
-            return spectral_radius_of(_scaled(propagate, basis), basis.numbers([np.eye(n) for n in basis.sizes]))
+            return spectral_radius_of(_scaled(propagate, basis, _scales(propagate, basis)), basis.identity)
         except UsageError:
             if basis.count > DENSE:
                 raise
@@ -208,12 +266,13 @@ def _dense_radius(propagate: Map, basis: "_SymmetricBasis") -> float:
     )
 
 
-def _scaled(propagate: Map, basis: "_SymmetricBasis") -> Map:
-    """The map in coordinates in which the moments that grow longest are near those of independent states of size 1.
+def _scales(propagate: Map, basis: "_SymmetricBasis") -> list[Floats]:
+    """The roots of the moments that grow longest, by mode: coordinates in which these are near those of independent
+    states of size 1.
 
-    In others, as those of a fast plant beside a slow one, eigenvalues of the map in a Krylov basis may be far off.
+    In others, as those of a fast plant beside a slow one, eigenvalues of a map in a Krylov basis may be far off.
     """
-    grown = basis.numbers([np.eye(n) for n in basis.sizes])
+    grown = basis.identity
     for _ in range(GROWN):
         grown = propagate(grown)
         grown /= max(float(np.linalg.norm(grown)), 1e-300)
@@ -221,12 +280,17 @@ def _scaled(propagate: Map, basis: "_SymmetricBasis") -> Map:
     for moments in basis.matrices(grown):
         sizes = np.sqrt(np.maximum(np.diag(moments), max(1e-20 * np.diag(moments).max(initial=0.0), 1e-300)))
         roots.append(sizes[:, None] * np.linalg.cholesky(moments / np.outer(sizes, sizes) + 1e-12 * np.eye(len(sizes))))
+    return roots
+
+
+def _scaled(of: Map, basis: "_SymmetricBasis", roots: Sequence[Floats]) -> Map:
+    """A map in the coordinates of `_scales`."""
     inverses = [np.linalg.inv(root) for root in roots]
 
     def turned(numbers: Floats, by: Sequence[Floats]) -> Floats:
         return basis.numbers([root @ each @ root.T for root, each in zip(by, basis.matrices(numbers))])
 
-    return lambda numbers: turned(propagate(turned(numbers, roots)), inverses)
+    return lambda numbers: turned(of(turned(numbers, roots)), inverses)
 
 
 class _BatchedStage:
@@ -262,6 +326,7 @@ class _SymmetricBasis:
         self.sizes = sizes
         self._cuts = np.cumsum([len(rows) for rows, _ in self._triangles]).tolist()
         self.count = self._cuts[-1]
+        self.identity = self.numbers([np.eye(n) for n in sizes])
 
     def matrices(self, numbers: Floats) -> list[Floats]:
         """The matrices of a row."""

@@ -215,6 +215,15 @@ class RandomLink:
         return transit + self.delay + self.delay_jitter.highest
 
     @property
+    def is_repeatable(self) -> bool:
+        """Whether in place of a lost message the one before may arrive again: this changes nothing then.
+
+        So whether messages were lost is in their numbers, and need not be known of each in transit.
+        """
+        times = {each for each in self.transit_times if each is not None}
+        return self.delay_jitter.is_certain and len(times) <= 1 and not self.first_order
+
+    @property
     def is_measured(self) -> bool:
         """Whether a task reads a signal in continuous time."""
         return self.sender is None and self.receiver is not None

@@ -18,7 +18,9 @@ from orchestration.theory.stability.matrices import Components, Continuous, Samp
 GAIN = 3.0 - math.sqrt(3.0)
 
 
-def integrator(*, nodes: int = 3, sampling: dict[str, Any] | None = None, **command: Any) -> JumpLinear:
+def integrator(
+    *, nodes: int = 3, sampling: dict[str, Any] | None = None, measurement: dict[str, Any] | None = None, **command: Any
+) -> JumpLinear:
     """x' = u + w under u = -GAIN x every second; its cost is x²."""
     system = System(
         stop_time=10.0,
@@ -27,7 +29,7 @@ def integrator(*, nodes: int = 3, sampling: dict[str, Any] | None = None, **comm
             "law": Component(fmu="law.fmu", sampling=Sampling(**{"period": 1.0, **(sampling or {})})),
         },
         connections=(
-            Connection(name="measurement", start=("plant.x",), end=("law.x",)),
+            Connection(name="measurement", start=("plant.x",), end=("law.x",), **(measurement or {})),
             Connection(name="command", start=("law.u",), end=("plant.u",), **command),
         ),
     )

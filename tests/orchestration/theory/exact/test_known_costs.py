@@ -90,6 +90,34 @@ def test_the_mean_square_limit_of_losses_is_that_of_theory(burst: float | None, 
     assert 0.5 * (found.good + found.bad) == pytest.approx(limit, abs=1e-9)
 
 
+@pytest.mark.parametrize(("samples", "scale"), [(3, 0.1), (60, 0.006)])
+def test_losses_before_a_long_delay_cost_what_two_matrices_say(samples: int, scale: float) -> None:
+    """Of x and the commands that were sent last at each of the samples before, newest first."""
+    n, p, gain = samples + 2, 0.2, scale * GAIN
+    moves = np.eye(n, k=-1)
+    moves[0, [0, samples]], moves[1, 0] = 1.0, 0.0
+    arrives, lost = moves.copy(), moves.copy()
+    arrives[1, 0], lost[1, 1] = -gain, 1.0
+    mean = (1.0 - p) * arrives + p * lost
+    differs = (arrives - lost)[1]  # all of which is in the newest command, so one number of it remains unknown
+
+    def sums(added: np.ndarray) -> np.ndarray:
+        found, turn = added, mean
+        for _ in range(20):
+            found, turn = found + turn @ found @ turn.T, turn @ turn
+        return found
+
+    by_noise, by_chance = sums(np.diag(np.eye(n)[0])), p * (1.0 - p) * sums(np.diag(np.eye(n)[1]))
+    moments = by_noise + differs @ by_noise @ differs / (1.0 - differs @ by_chance @ differs) * by_chance
+    x, u = 0, samples
+    cost = moments[x, x] + moments[x, u] + moments[u, u] / 3.0 + 0.5
+    lossy = {"delay": float(samples), "loss": p}
+    commanded, measured = integrator(scale=scale, **lossy), integrator(scale=scale, measurement=lossy)
+    assert commanded.costs()[0] == pytest.approx(cost, rel=1e-11)
+    assert measured.costs()[0] == pytest.approx(cost, rel=1e-11)  # of a static law a late measurement is a late command
+    assert 1.0 > commanded.radius >= np.abs(np.linalg.eigvals(mean)).max() ** 2
+
+
 @pytest.mark.parametrize(
     "changes",
     [
