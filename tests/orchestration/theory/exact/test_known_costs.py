@@ -111,7 +111,7 @@ def test_losses_before_a_long_delay_cost_what_two_matrices_say(samples: int, sca
     moments = by_noise + differs @ by_noise @ differs / (1.0 - differs @ by_chance @ differs) * by_chance
     x, u = 0, samples
     cost = moments[x, x] + moments[x, u] + moments[u, u] / 3.0 + 0.5
-    lossy = {"delay": float(samples), "loss": p}
+    lossy: dict[str, Any] = {"delay": float(samples), "loss": p}
     commanded, measured = integrator(scale=scale, **lossy), integrator(scale=scale, measurement=lossy)
     assert commanded.costs()[0] == pytest.approx(cost, rel=1e-11)
     assert measured.costs()[0] == pytest.approx(cost, rel=1e-11)  # of a static law a late measurement is a late command
