@@ -285,7 +285,7 @@ def _scales(propagate: Map, basis: "_SymmetricBasis") -> list[Floats]:
 
 def _scaled(of: Map, basis: "_SymmetricBasis", roots: Sequence[Floats]) -> Map:
     """A map in the coordinates of `_scales`."""
-    inverses: list[Floats] = [np.linalg.inv(root) for root in roots]
+    inverses = [np.asarray(np.linalg.inv(root)) for root in roots]
 
     def turned(numbers: Floats, by: Sequence[Floats]) -> Floats:
         return basis.numbers([root @ each @ root.T for root, each in zip(by, basis.matrices(numbers))])
