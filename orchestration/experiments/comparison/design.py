@@ -159,6 +159,12 @@ class Comparison:
         """The initial conditions, about the start of the base's reference."""
         return tuple(self.base.initial_conditions(self.starts))
 
+    @property
+    def start_settings(self) -> list[dict[str, Value]]:
+        """The values that the runs from each initial condition begin with, by path, with their seed."""
+        first = self.base.seed + self.starts.first
+        return [{**start.values, "seed": first + i} for i, start in enumerate(self.initial_conditions)]
+
     @cached_property
     def study(self) -> Study:
         """The study of all runs, cell by cell. Each initial condition has its own seed, the same in every cell."""
@@ -185,7 +191,7 @@ class Comparison:
                 ),
                 LinkedSettings(
                     axes=(START,),
-                    sets={(i,): self._start_settings(i, start) for i, start in enumerate(self.initial_conditions)},
+                    sets={(i,): settings for i, settings in enumerate(self.start_settings)},
                 ),
             ),
         )
@@ -206,9 +212,6 @@ class Comparison:
 
     def _tuned_settings(self) -> dict[Key, Values]:
         return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
-
-    def _start_settings(self, index: int, start: InitialConditions) -> dict[str, Value]:
-        return {**start.values, "seed": self.base.seed + self.starts.first + index}
 
     def values_of(self, condition: str, value: Value) -> dict[str, Value]:
         """The values by axis at a condition and a value of the first axis."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from fmu_kit.new_files import new_files
 from orchestration.experiments.comparison.bandwidth import Bandwidths, bandwidths
 from orchestration.experiments.comparison.cells import CellSummary, cell_summaries, table_of_runs, with_second_axis
-from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.design import START, Comparison
 from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.comparison.outcome import Outcome, outcome_of, write
 from orchestration.experiments.studies.store import store_path
@@ -120,16 +120,19 @@ class Compared:
         return Figures(pictures.figures_of(self.comparison, self.outcome, self.table, chosen, units=units), chosen)
 
     @explains_missing
-    def to_pandas(self, what: Literal["cells", "limits", "pairs", "runs"] = "cells") -> "pd.DataFrame":
+    def to_pandas(self, what: Literal["cells", "limits", "pairs", "runs", "starts"] = "cells") -> "pd.DataFrame":
         """A row for each cell: counts of runs that survive and settle, medians; or the limits, the pairs, or the runs.
 
-        Raises `UsageError` for another name.
+        Or for each of the starts, by the number that it has in the runs: its values by path and its seed, which `fly`
+        takes. Raises `UsageError` for another name.
         """
         import pandas as pd
 
-        expect_one_of("what", what, ("cells", "limits", "pairs", "runs"))
+        expect_one_of("what", what, ("cells", "limits", "pairs", "runs", "starts"))
         if what == "runs":
             return self.table
+        if what == "starts":
+            return pd.DataFrame(self.comparison.start_settings).rename_axis(START)
         if what == "limits":
             return pd.DataFrame([vars(one) for one in self.outcome.limits])
         rows = [one.row() for one in (self.outcome.pairs if what == "pairs" else self.outcome.cells)]

@@ -99,6 +99,11 @@ def test_python_has_the_pictures_by_name(table: str, folder: Path) -> None:
     assert found.verdict.startswith("from half of the starts, over period: coupled survives ")
     with pytest.raises(UsageError, match=r"what = 'fronts': .*expected one of cells, limits, pairs, runs"):
         found.to_pandas("fronts")  # type: ignore[arg-type]
+    starts, runs = found.to_pandas("starts"), found.to_pandas("runs").query("design_index < 6")
+    assert starts.index.name == "start"
+    assert (len(starts), [*starts["seed"]]) == (6, [*runs["seed"]])
+    system = native.study.system(4, {})
+    assert starts.loc[4, "plant.initial.position.x"] == system.components["plant"].parameters["initial.position.x"]
     pairs = found.to_pandas("pairs")
     assert pairs["both"].tolist() == [one.both for one in found.outcome.pairs]
     assert pairs["error.low"].count() == sum(one.error.low is not None for one in found.outcome.pairs)
