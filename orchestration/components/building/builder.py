@@ -125,12 +125,9 @@ def build(
     announce: Callable[[str], None] | None = None,
     *,
     packing: Packing = IN_PYTHON,
-    systems: str | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> list[Path]:
     """Build FMUs of this project into `folder`, as `build_slaves`; returns their paths."""
-    targets = [Target.parse(MODELS[name]) for name in names]
-    return build_slaves(targets, folder, announce, packing=packing, systems=systems, progress=progress)
+    return build_slaves([Target.parse(MODELS[name]) for name in names], folder, announce, packing=packing)
 
 
 def slaves_of(folder: Path) -> list[Target]:

@@ -10,8 +10,8 @@ from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.foundation.processes.passable import passable
 from orchestration.quadrotor.flight.hover import NotSmooth, at_edge, at_hover
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
-from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import range_of
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.paths import changed

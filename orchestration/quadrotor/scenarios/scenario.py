@@ -16,9 +16,8 @@ from orchestration.quadrotor.scenarios import translation, wiring
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.scenarios.initial_conditions import initial_conditions
 from orchestration.quadrotor.scenarios.nominal_model import axis_mismatch, model_mismatch
-from orchestration.quadrotor.scenarios.quantities import range_of
 from orchestration.quadrotor.scenarios.scenario_text import text_of
-from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.quadrotor.scenarios.timing import Timing, range_of
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.simulation.results.objectives import with_own_objectives
 from orchestration.simulation.results.quantities import setting

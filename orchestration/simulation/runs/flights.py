@@ -12,7 +12,7 @@ from orchestration.foundation.basics.errors import Named, UsageError, expected_n
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.statistics import Estimate, wilson
 from orchestration.simulation.results.objectives import OUTCOME, how_runs_ended
-from orchestration.simulation.runs.labels import RUN
+from orchestration.simulation.runs.columns import RUN
 
 if TYPE_CHECKING:
     import pandas as pd

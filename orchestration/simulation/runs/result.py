@@ -249,6 +249,6 @@ class Result:
 
         Raises `QuadcosimError` where SciPy is not installed.
         """
-        from orchestration.simulation.results import exports
+        from orchestration.foundation.recording import frames
 
-        return exports.to_mat(Path(path), self.recording, self.about, self.metrics, self.units)
+        return frames.to_mat(Path(path), self.recording, self.about, self.metrics, self.units)

@@ -5,10 +5,8 @@ The tables of the documentation are made of their docstrings by `docs/website/ru
 
 from orchestration.components.checks.validation import (
     archive_rules,
-    clocks,
     dependencies,
     description,
-    exchange_rules,
     other_interfaces,
     own_rules,
     reference_results,
@@ -26,10 +24,8 @@ OF_DESCRIPTIONS = (
     *variables.RULES,
     *units.RULES,
     *structure.RULES,
-    *clocks.RULES,
-    *exchange_rules.RULES,
 )
-OF_RUNS = (*run_rules.RULES, *exchange_rules.OF_RUNS, *reference_results.RULES)
+OF_RUNS = (*run_rules.RULES, *structure.OF_RUNS, *reference_results.RULES)
 """Rules that rely on `run_rules.FIRST`"""
 OF_EQUAL_RUNS = (*run_rules.COMPARED, *dependencies.RULES)
 """Rules for FMUs whose runs can be repeated"""

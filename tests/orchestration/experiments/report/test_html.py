@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from orchestration.experiments.report import html, of_runs
+from orchestration.experiments.report import of_runs
 from orchestration.experiments.report.model import Report, ReportRun
+from orchestration.experiments.report.writing import as_html
 from orchestration.experiments.report.writing import report as write
 from orchestration.simulation.runs.simulation import run
 from quadcosim import Timing
@@ -34,19 +35,19 @@ def document(text: str) -> dict[str, Any]:
 
 
 def test_names_are_in_the_file_as_they_are_and_end_no_element() -> None:
-    text = html.as_html(report(title=NASTY, runs=(ReportRun(name=NASTY),), command=NASTY))
+    text = as_html(report(title=NASTY, runs=(ReportRun(name=NASTY),), command=NASTY))
     assert document(text)["title"] == NASTY
     assert "<script>alert" not in text
     assert text.count("</script>") == 2
 
 
 def test_what_is_not_finite_is_null() -> None:
-    text = html.as_html(report(runs=(ReportRun(name="run", metrics={"a": float("nan"), "b": float("inf"), "c": 1.5}),)))
+    text = as_html(report(runs=(ReportRun(name="run", metrics={"a": float("nan"), "b": float("inf"), "c": 1.5}),)))
     assert document(text)["runs"][0]["metrics"] == {"a": None, "b": None, "c": 1.5}
 
 
 def test_the_page_forbids_itself_to_load_anything() -> None:
-    text = html.as_html(report())
+    text = as_html(report())
     assert "default-src 'none'" in text
     assert "unsafe-eval" not in text
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", text)
