@@ -55,6 +55,10 @@ def bode(
         "stable": found.stable,
         "sensitivity_peak": found.sensitivity_peak,
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
+        "outputs": found.outputs,
+        "frequencies": found.frequencies.tolist(),
+        "gains": abs(found.gains).tolist(),
+        "phases": found.phases.tolist(),
     }
     lines = list(in_columns(rows, right=True)) if found.loops else []
     lines += [f"delay margin of {loop.output}: {loop.delay_reason}" for loop in found.loops if loop.delay_reason]

@@ -273,7 +273,8 @@ def from_json(text: str) -> UserCode:
     given = json.loads(text)
     for name in ("declare", "init", "after_parameters"):
         given[name] = None if given[name] is None else Code(**given[name])
-    lists = {name: tuple(given[name]) for name in ("sources", "include", "defines")}
+    lists = {name: tuple(given[name]) for name in ("sources", "defines")}
+    lists["include"] = (*given["include"], ".")  # of a header beside the file
     lists["headers"] = tuple(Code(**each) for each in given["headers"])
     lists["tasks"] = tuple(Task(**{**each, "step": Code(**each["step"])}) for each in given["tasks"])
     lists["places"] = tuple(Place(**{**each, "lvalue": Code(**each["lvalue"])}) for each in given["places"])

@@ -95,7 +95,7 @@ class WrapFile:
     declare: str = ""
     """Declarations beside the headers, such as `static` variables for inputs and outputs."""
     include: tuple[str, ...] = ()
-    """Folders in which headers are searched."""
+    """Folders in which headers are searched, before that of the file."""
     defines: tuple[str, ...] = ()
     """Definitions of the preprocessor, as `NDEBUG` or `RATE=100`."""
     headers: tuple[str, ...] = ()

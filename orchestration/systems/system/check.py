@@ -186,7 +186,8 @@ def _wrong_causality(end: End, expected: str, valid: Iterable[str]) -> str:
 
 
 def _with_article(variable: Variable) -> str:
-    return f"a{'n' if variable.causality[0] in 'aeiou' else ''} {variable.causality}"
+    shown = variable.causality if variable.causality != "local" else f"{variable.variability} local variable"
+    return f"a{'n' if shown[0] in 'aeiou' else ''} {shown}"
 
 
 def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:

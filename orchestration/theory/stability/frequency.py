@@ -120,6 +120,13 @@ class Bode:
         return f"<Bode: {self.verdict}>"
 
     @property
+    def phases(self) -> Floats:
+        """Phases without jumps [deg], shape (loops, n), from between -270 and 90 at the lowest frequency."""
+        phases = np.degrees(np.unwrap(np.angle(self.gains), axis=-1))
+        unturned: Floats = phases - 360.0 * np.ceil((phases[:, :1] - 91.0) / 360.0)
+        return unturned
+
+    @property
     def verdict(self) -> str:
         """The smallest margins of a loop, or that it is unstable and has none."""
         clock = clock_of(self.dt, self.samples)

@@ -16,7 +16,6 @@ from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal
 from orchestration.simulation.results.quantities import setting
 from orchestration.theory.stability.frequency import Bode, LoopMargins
-from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step_response import Step
 
@@ -43,10 +42,10 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     figure = style.figure(66.0)
     above, middle, below = figure.subplots(3, sharex=True)
     several = len(result.outputs) > 1
-    for i, (gain, output) in enumerate(zip(result.gains, result.outputs, strict=True)):
+    for i, (gain, phase, output) in enumerate(zip(result.gains, result.phases, result.outputs, strict=True)):
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
-        phase, loop = _phase(gain), result.loops[i] if result.stable else None
+        loop = result.loops[i] if result.stable else None
         phase[np.abs(gain) < LEAST] = np.nan
         name = signal(output, {})
         label = f"{name}: {_sizes(loop)}" if several and loop is not None else name
@@ -117,13 +116,6 @@ def _mark_margins(
         else:
             beside = {"xytext": (0.0, -3.0), "va": "top"} if end > none else {"xytext": (0.0, 3.0)}
             axes.annotate(size, (at, none), textcoords="offset points", ha="center", color=color, **beside)
-
-
-def _phase(gain: Complexes) -> Floats:
-    """The phase without jumps [°], from between -270 and 90 at the lowest frequency."""
-    phase = np.degrees(np.unwrap(np.angle(gain)))
-    unturned: Floats = phase - 360.0 * np.ceil((phase[0] - 91.0) / 360.0)
-    return unturned
 
 
 def step_figure(result: Step, style: Style = SCREEN) -> Figure:

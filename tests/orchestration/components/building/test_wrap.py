@@ -38,7 +38,7 @@ name = "Pd"
 period = 0.05
 sources = ["pd.c"]
 headers = ["pd.h"]
-include = ["."]
+author = "A"
 declare = "static pd_in in; static pd_out out;"
 init = "pd_init();"
 step = "pd_step(&in, &out);"
@@ -249,7 +249,7 @@ def test_it_is_made_again_when_a_header_changes_only(of: Callable[..., Path], pd
         ("in.x", "in.x * 2", "pd.toml:10: error: lvalue required as left operand of assignment"),
         ("pd_init();", "pd_init()", "pd.toml:7: error: expected ';' before '}' token"),
         ('"pd_step(&in, &out);"', "'''\npd_step(&in, &out);\nno;\n'''", "pd.toml:10: error: 'no' undeclared"),
-        ('include = ["."]', 'include = ["."]\ndefines = ["double=5"]', "pd.toml: defines: error: expected"),
+        ('author = "A"', 'defines = ["double=5"]', "pd.toml: defines: error: expected"),
         (
             '"in.x"',
             '"in"',

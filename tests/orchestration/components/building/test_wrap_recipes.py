@@ -104,7 +104,6 @@ name = "Loop"
 period = 0.0025
 sources = ["arm_biquad_cascade_df1_f32.c", {sources}]
 headers = ["arm_math.h"]
-include = ["."]
 declare = '''
 {notch}
 {stub}

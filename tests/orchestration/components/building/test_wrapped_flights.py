@@ -289,7 +289,6 @@ def wrapped(name: str, folder: Path) -> Path:
         "period = 0.01",
         f'sources = ["{name}.c"]',
         f'headers = ["{name}.h"]',
-        'include = ["."]',
         f'declare = "static {name} law; static long long tick;"',
         f'init = "{name}_init(&law);"',
         f'after_parameters = "{name}_start(&law, 0.0);"',

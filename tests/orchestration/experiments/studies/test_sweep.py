@@ -246,7 +246,7 @@ def test_runs_that_fail_and_diverge_have_the_same_rows_with_two_workers(tmp_path
         (study(axis("plant.mass", "heavy")), "plant.mass = heavy: expected a number"),
         (study(axis("plant.mass", True)), "plant.mass = True: expected a number"),
         (study(axis("plant.position.x", 1.0)), "plant.position.x: is an output; expected a parameter"),
-        (study(axis("plant.tilt", 1.0)), "plant.tilt: is a local; expected a parameter, an input"),
+        (study(axis("plant.tilt", 1.0)), "plant.tilt: is a continuous local variable; expected a parameter, an input"),
         (study(axis("timing.period", 0.01, -0.01)), "timing.period = -0.01: expected a positive number"),
         (study(axis("timing.jitter", 0.001, 0.02), base=short(period=0.01)), "run 1 (timing.jitter = 0.02): timing."),
         (study(axis("timing.noise.posit", 0.1)), "timing.noise: posit is no signal"),

@@ -296,8 +296,12 @@ def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
 def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Path) -> None:
     file = EXAMPLES / "dc_servo" / "system.toml"
     document = json.loads(main("bode", file, "--json", "--out", tmp_path).stdout)
-    assert document.keys() == {"verdict", "dt", "stable", "sensitivity_peak", "loops"}
+    drawn = {"outputs", "frequencies", "gains", "phases"}
+    assert document.keys() == {"verdict", "dt", "stable", "sensitivity_peak", "loops", *drawn}
+    (gains,), (phases,), at = document["gains"], document["phases"], document["frequencies"]
+    assert gains == np.abs(bode_of("dc_servo").gains[0]).tolist()
     loops = [dataclasses.asdict(loop) for loop in bode_of("dc_servo").loops]
+    assert np.interp(loops[0]["crossover"], at, phases) == pytest.approx(loops[0]["phase_margin"] - 180.0, abs=0.1)
     assert document["loops"] == json.loads(json.dumps(loops))
     assert document["verdict"] == (
         "stable, sampled every 6 ms: gain margins 0.169 and 3.25, phase margin 33.7°, delay margin 11.5 ms "

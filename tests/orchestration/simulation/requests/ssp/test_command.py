@@ -194,7 +194,7 @@ UNCONNECTED = "expected a parameter, an input that nothing is connected to"
         ("plant.thrust", 1.0, f"is connected; {UNCONNECTED}"),
         ("controller.position.x", 1.0, f"is connected; {UNCONNECTED}"),
         ("plant.position.x", 1.0, f"is an output; {UNCONNECTED}"),
-        ("plant.tilt", 1.0, f"is a local; {UNCONNECTED}"),
+        ("plant.tilt", 1.0, f"is a continuous local variable; {UNCONNECTED}"),
     ],
 )
 def test_a_name_that_is_neither_parameter_nor_open_input_is_rejected(
