@@ -94,7 +94,6 @@ class Simulation:
         """Go on with a command and return the next measurement; at the end of the run, the true values then.
 
         These, also where a run diverges, are neither late, lost nor noisy: the component is not stepped there.
-        Inputs that a source feeds keep the values of the last step.
         `command` is an array with one number for each of `commanded`, or their values by name. Raises `UsageError` for
         anything else, and where no run is under way.
         """
@@ -194,9 +193,13 @@ class Simulation:
 
     def _measure_end(self, run: PreparedRun) -> None:
         """Deliver the measurement at the end of the run, where the component is not stepped."""
-        for x, channel in zip(self._resolved.system.connections, run.master.running.channels):
+        running = run.master.running
+        for x, channel in zip(self._resolved.system.connections, running.channels):
             if x.receiver == self.component:
                 channel.pass_on()
+        for feed in running.feeds:
+            if feed.feeds(self.component):
+                feed.write(seconds(running.now))
 
     # -- the thread that waits for it ------------------------------------------------------------------------------
 

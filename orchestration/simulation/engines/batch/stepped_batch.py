@@ -35,6 +35,9 @@ class SteppedBatch(Batch):
             for i, x in enumerate(shape.system.connections)
             if x.receiver == component
         ]
+        places = {int(reference): i for i, reference in enumerate(self._inputs)}
+        self._fed = [(number, places[place]) for number, place in shape.fed[component] if place in places]
+        """Numbers of the values that sources give, and the places in a measurement that get them"""
         seen = zip((name for names in shape.seen.values() for name in names), self.arrays.seen)
         self._views: dict[str, Floats] = {"time": np.zeros(shape.lanes), **dict(seen)}
         columns = [column for column in shape.board.columns if column != "time"]
@@ -49,6 +52,7 @@ class SteppedBatch(Batch):
         """
         self.numbers.columns = group.parameters
         self.count = len(group.systems)
+        self._stops = [system.stop_time for system in group.systems]
         padding = self._shape.lanes - self.count
         self._initialisation.outputs = self._outputs, np.pad(initial, ((0, 0), (0, padding)))
         self._set_out(group, _NOTHING_KNOWN)
@@ -101,6 +105,12 @@ class SteppedBatch(Batch):
             sender = self.arrays.memories[self._shape.names.index(self._shape.system.connections[i].sender)]
             sent = self._initialisation.received_values(i, self._initialisation.sent_values(i, sender))
             values[:, places] = sent.T[: self.count]
+        for lane in np.flatnonzero(~self.waiting).tolist() if self._fed else ():
+            has_diverged = self._loop.outcome[lane] == self._c.DIVERGED
+            t = seconds(self._loop.outcome_time[lane]) if has_diverged else self._stops[lane]
+            given = [value for source in self._runs[lane].given for value in source.at(t)]
+            for number, place in self._fed:
+                values[lane, place] = given[number]
         return values
 
     def command(self, values: Floats) -> None:

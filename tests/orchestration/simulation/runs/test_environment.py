@@ -6,6 +6,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from scipy.linalg import solve_discrete_are
 import quadcosim
 from orchestration.components.building import fmus
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.systems.system.connection import Source
 from tests.native import NATIVE
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.runs.test_stepping import law
@@ -143,6 +145,40 @@ def test_environments_in_lanes_have_the_episodes_of_each_alone(initial: Any) -> 
     assert (truncated > 1).any()
     many.close()
     each.close()
+
+
+@needs_compiler
+def test_the_last_observation_has_what_a_source_feeds_then(tmp_path: Path) -> None:
+    (tmp_path / "line.csv").write_text("time,position.x\n0.0,0.0\n1.0,1.0\n")
+    system = SHORT.with_values({"timing.period": 0.02, "stop_time": 0.1}).as_system()
+    ends = {x.name: [(*each,) for each in zip(x.start, x.end) if each[1] != "controller.position.x"]
+            for x in system.connections}  # fmt: skip
+    fed = replace(
+        system,
+        connections=tuple(replace(x, start=(*next(zip(*ends[x.name])),), end=(*list(zip(*ends[x.name]))[1],))
+                          for x in system.connections),
+        sources={**system.sources, "line": Source(to=("controller.position.x",), file=tmp_path / "line.csv")},
+    )  # fmt: skip
+    begin = lambda random: {f"components.plant.parameters.{k[6:]}": value for k, value in far(random).items()}  # noqa: E731
+    settings = {"low": LOW, "high": HIGH, "starts": begin}
+    many = gym.VectorEnvironment(fed, lambda now: now["plant.position.x"], num_envs=6, **settings)
+    alone = [gym.Environment(fed, lambda now: now["plant.position.x"], **settings) for _ in range(6)]
+    place, over, times = many.runs.measured.index("position.x"), np.zeros(6, dtype=bool), set[float]()
+    many.reset(seed=3)
+    for i, each in enumerate(alone):
+        each.reset(seed=3 + i)
+    while not over.all():
+        observed, _, terminated, truncated, _ = many.step(np.tile([9.81, 0.0, 0.0, 0.0], (6, 1)))
+        for i in np.flatnonzero(~over).tolist():
+            expected, _, *ended, _ = alone[i].step([9.81, 0.0, 0.0, 0.0])
+            assert observed[i].tobytes() == expected.tobytes()
+            assert observed[i, place] == pytest.approx(alone[i].simulation.time)
+            assert any(ended) == (terminated | truncated)[i]
+            times |= {alone[i].simulation.time} if any(ended) else set()
+        over |= terminated | truncated
+    assert len(times) > 1, "one that diverged, one at its end"
+    for each in (many, *alone):
+        each.close()
 
 
 def far(random: np.random.Generator) -> dict[str, float]:
