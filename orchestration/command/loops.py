@@ -12,7 +12,7 @@ from orchestration.foundation.basics.terminal import in_columns, inform
 from orchestration.foundation.basics.unit_algebra import quantity
 
 if TYPE_CHECKING:
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 Cut = Annotated[
     str | None,

@@ -16,13 +16,12 @@ from orchestration.components.building.models import MODELS
 from orchestration.components.checks.validation import confined_process, run_rules
 from orchestration.components.checks.validation.finding import Finding
 from orchestration.components.checks.validation.fmu import Fmu
-from orchestration.components.checks.validation.own_description import differences, elements
+from orchestration.components.checks.validation.own_rules import differences, elements
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.progress import Frame, ReceivedReport, Reporter
 from orchestration.components.checks.validation.structure import initial_unknowns, known_dependencies, outputs
-from orchestration.components.checks.validation.units import dimensions, unit_meaning
 from orchestration.components.checks.validation.validator import validate
-from orchestration.components.checks.validation.variables import aliases, names
+from orchestration.components.checks.validation.variables import aliases, dimensions, names, unit_meaning
 from orchestration.components.fmi.instance import start_value
 from orchestration.components.fmi.read_description import attribute, scalars_of
 from orchestration.foundation.basics.errors import QuadcosimError

@@ -35,8 +35,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.simulation.figures.gallery import Figures
-    from orchestration.simulation.figures.style import Style
+    from orchestration.simulation.figures.style import Figures, Style
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -113,8 +112,7 @@ class Compared:
         `style` sets sizes and fonts. Raises `UsageError` for an unknown style.
         """
         from orchestration.experiments.comparison import pictures
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
+        from orchestration.simulation.figures.style import Figures, style_named
 
         chosen, units = style_named(style), units_in(self.summary.path)
         return Figures(pictures.figures_of(self.comparison, self.outcome, self.table, chosen, units=units), chosen)

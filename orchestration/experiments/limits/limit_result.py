@@ -12,7 +12,7 @@ from orchestration.simulation.results import html
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,8 +142,7 @@ class Limit:
         `style` sets its size and fonts. Raises `UsageError` for an unknown style.
         """
         from orchestration.experiments.limits.figure import limit_figure
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
+        from orchestration.simulation.figures.style import Figures, style_named
 
         chosen = style_named(style)
         with chosen.applied():

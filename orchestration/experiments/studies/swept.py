@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -74,8 +74,7 @@ class Swept:
         Raises `UsageError` for an unknown metric, or axes for which there is no figure.
         """
         from orchestration.experiments.studies.drawing import study_figures
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import SCREEN
+        from orchestration.simulation.figures.style import SCREEN, Figures
 
         figures, _ = study_figures(self.study, self.path, metric, SCREEN)
         return Figures(figures, SCREEN)

@@ -10,9 +10,8 @@ from orchestration.foundation.basics.documents import tables_in
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, shown
 from orchestration.foundation.recording.recording import thinned
 from orchestration.simulation.figures.drawn_run import DrawnRun, Window
-from orchestration.simulation.figures.gallery import Figures
 from orchestration.simulation.figures.signals import columns_of, of_name
-from orchestration.simulation.figures.style import SCREEN, Style, style_named
+from orchestration.simulation.figures.style import SCREEN, Figures, Style, style_named
 from orchestration.simulation.figures.views import VIEWS, View, view_of
 from orchestration.simulation.results import quantities
 from orchestration.simulation.results.quantities import Quantity

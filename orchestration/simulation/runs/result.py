@@ -25,7 +25,7 @@ from orchestration.systems.system.request import Request
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 
 class Origin(TypedDict):

@@ -26,7 +26,7 @@ from orchestration.systems.schedule.responses import Responses, responses_of
 from orchestration.systems.system.request import Request, system_of
 
 if TYPE_CHECKING:
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +74,7 @@ class Scheduled:
     def plot(self, window: tuple[float, float] | None = None, style: str = "screen") -> "Figures":
         """Its Gantt chart, over a `window` of time [s]; default: from the start, as long as jobs can be told apart."""
         from orchestration.simulation.figures import gantt
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
+        from orchestration.simulation.figures.style import Figures, style_named
 
         chosen = style_named(style)
         if window is not None:

@@ -23,7 +23,7 @@ ROOTS = (
 """Entry modules of the simulation code; two are started by name as separate processes, one is registered"""
 _EXCLUDED = (
     "orchestration.components.building.fmus",
-    "orchestration.simulation.figures.gallery",
+    "orchestration.simulation.figures.style",
     "orchestration.foundation.recording.tables",
     "orchestration.simulation.requests.ssp.reading",
     "orchestration.simulation.runs.draw",

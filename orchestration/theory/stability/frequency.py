@@ -41,7 +41,7 @@ from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
 
 if TYPE_CHECKING:
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 LOWEST = 1e-5
 """Lowest frequency, as a share of the highest"""
@@ -154,8 +154,7 @@ class Bode:
 
         `style` sets its size and fonts. Raises `UsageError` for an unknown style.
         """
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
+        from orchestration.simulation.figures.style import Figures, style_named
         from orchestration.theory.stability.loop_figures import bode_figure
 
         chosen = style_named(style)

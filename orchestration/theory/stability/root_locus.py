@@ -41,7 +41,7 @@ from orchestration.theory.stability.poles import Complexes, poles_of
 from orchestration.theory.stability.sign_changes import zero_between
 
 if TYPE_CHECKING:
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 COUNT = 40
 """Values by default"""
@@ -122,8 +122,7 @@ class RootLocus:
 
         `style` sets sizes and fonts. Raises `UsageError` for an unknown style.
         """
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
+        from orchestration.simulation.figures.style import Figures, style_named
         from orchestration.theory.stability.loop_figures import locus_figure
 
         chosen = style_named(style)

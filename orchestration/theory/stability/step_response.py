@@ -17,7 +17,7 @@ from orchestration.theory.stability.linearise import Linearised, clock_of, linea
 from orchestration.theory.stability.loop_halves import ClosedLoop, closed
 
 if TYPE_CHECKING:
-    from orchestration.simulation.figures.gallery import Figures
+    from orchestration.simulation.figures.style import Figures
 
 LEFT = 1e-4
 """Share of a step that is left when its response ends"""
@@ -87,8 +87,7 @@ class Step:
 
         `style` sets sizes and fonts. Raises `UsageError` for an unknown style.
         """
-        from orchestration.simulation.figures.gallery import Figures
-        from orchestration.simulation.figures.style import style_named
+        from orchestration.simulation.figures.style import Figures, style_named
         from orchestration.theory.stability.loop_figures import step_figure
 
         chosen = style_named(style)

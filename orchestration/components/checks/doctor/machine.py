@@ -11,11 +11,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestration.components.checks.doctor import loader
 from orchestration.components.checks.doctor.binaries import LINUX, MACOS, WINDOWS
 from orchestration.components.checks.doctor.fmu import ARCHITECTURES, SYSTEMS, InspectedFmu
-from orchestration.components.checks.doctor.loader import DynamicLoader
-from orchestration.components.checks.doctor.pythons import PythonLibrary, python_libraries
+from orchestration.components.checks.doctor.pythons import (
+    DynamicLoader,
+    PythonLibrary,
+    loader_of_programs,
+    loader_of_this_python,
+    python_libraries,
+    read_file,
+)
 
 _SYSTEMS = {"Linux": LINUX, "Windows": WINDOWS, "Darwin": MACOS}
 _FOLDERS = {LINUX: "linux", WINDOWS: "win", MACOS: "darwin"}
@@ -75,8 +80,8 @@ def this_machine(fmus: Iterable[InspectedFmu]) -> Machine:
     """This machine, examined for the requirements of `fmus`."""
     fmus = tuple(fmus)
     system, architecture = _SYSTEMS.get(platform.system(), platform.system()), _architecture()
-    programs = loader.loader_of_programs(system, architecture)
-    own = loader.loader_of_this_python(programs)
+    programs = loader_of_programs(system, architecture)
+    own = loader_of_this_python(programs)
     required = {
         name: part.binary.run_path
         for fmu in fmus
@@ -121,7 +126,7 @@ def _shared(system: str) -> bool | None:
     """Whether the executable needs a libpython; on Windows every Python has its DLL."""
     if system == WINDOWS:
         return True
-    binary = loader.read_file(Path(sys.executable))
+    binary = read_file(Path(sys.executable))
     if binary is None or binary.dependencies is None:
         return None
     return any(name.startswith("libpython") for name in binary.dependency_names)
@@ -129,7 +134,7 @@ def _shared(system: str) -> bool | None:
 
 def _library(where: DynamicLoader, name: str, run_path: Iterable[str]) -> Library | None:
     path = where.find(name, run_path)
-    binary = None if path is None else loader.read_file(path)
+    binary = None if path is None else read_file(path)
     return None if path is None or binary is None else Library(path=path, versions=binary.defined_versions)
 
 

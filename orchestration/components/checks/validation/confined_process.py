@@ -15,7 +15,7 @@ from orchestration.components.checks.validation.archive_rules import can_be_unpa
 from orchestration.components.checks.validation.description import standard
 from orchestration.components.checks.validation.fmu import Fmu, read_fmu
 from orchestration.components.checks.validation.other_interfaces import run_of_fmi1, trials_of_fmi1
-from orchestration.components.checks.validation.own_description import own_description
+from orchestration.components.checks.validation.own_rules import own_description
 from orchestration.components.checks.validation.probe import Probe
 from orchestration.components.checks.validation.progress import Reporter
 from orchestration.components.checks.validation.structure import indices

@@ -13,16 +13,14 @@ from orchestration.components.checks.validation import (
     refusals,
     run_rules,
     structure,
-    units,
     variables,
 )
-from orchestration.components.checks.validation.own_description import own_description
+from orchestration.components.checks.validation.own_rules import own_description
 
 OF_ARCHIVES = archive_rules.RULES
 OF_DESCRIPTIONS = (
     *description.RULES,
     *variables.RULES,
-    *units.RULES,
     *structure.RULES,
 )
 OF_RUNS = (*run_rules.RULES, *structure.OF_RUNS, *reference_results.RULES)

@@ -1,16 +1,19 @@
-"""Rules on variables: their names, their bounds, and those that share a value reference."""
+"""Rules on variables: their names, bounds, units and clocks, and those that share a value reference."""
 
 import math
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from fmpy.model_description import ModelVariable
 
+from fmu_kit.units import BASE, SYMBOLS, base_unit_exponents
 from orchestration.components.checks.validation.fmu import NUMBERS, Fmu
 from orchestration.components.fmi.read_description import PERIODIC, attribute, kind_of, starts_of
 
+COHERENT = {symbol: SYMBOLS[symbol] for symbol in ("1", *BASE, "N", "Pa", "J", "W", "V")}
+"""Symbols with one meaning only, whoever writes them; `Hz`, with or without a turn, and `C` have two."""
 _OF_PERIODS = ("intervalDecimal", "intervalCounter", "resolution", "shiftDecimal", "shiftCounter")
 _QUOTED = r"""'(?:[0-9A-Za-z_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['"?\\abfnrtv])+'"""
 _PART = rf"(?:[A-Za-z_][0-9A-Za-z_]*|{_QUOTED})(?:\[[0-9]+(?:,[0-9]+)*\])?"
@@ -131,4 +134,32 @@ def _number(text: str) -> Fraction | None:
         return None
 
 
-RULES = (names, bounds, arrays, aliases, clocks)
+def dimensions(name: str) -> dict[str, int] | None:
+    """Exponents of the base units of a name made of `COHERENT` symbols; None for any other."""
+    try:
+        return base_unit_exponents(name, COHERENT)
+    except ValueError:
+        return None
+
+
+def unit_meaning(fmu: Fmu) -> Iterator[str]:
+    """A unit with a coherent name has the exponents of that name, a factor of 1 and no offset."""
+    for unit in fmu.description.unitDefinitions:
+        base, expected = unit.baseUnit, dimensions(unit.name)
+        if base is None or expected is None:
+            continue
+        found = {symbol: getattr(base, symbol) for symbol in BASE}
+        wrong = [symbol for symbol in BASE if found[symbol] != expected.get(symbol, 0)]
+        if wrong == ["rad"] and found["rad"] == 0 and not fmu.is_ours:
+            wrong = []  # FMI allows a tool to take the radian for 1
+        if wrong:
+            yield f"unit {unit.name}: base units {_listed(found)}, expected {_listed(expected)}"
+        if (base.factor, base.offset) != (1.0, 0.0):
+            yield f"unit {unit.name}: factor = {base.factor:g} and offset = {base.offset:g}, expected 1 and 0"
+
+
+def _listed(exponents: Mapping[str, int]) -> str:
+    return " ".join(f"{symbol}={exponents[symbol]}" for symbol in BASE if exponents.get(symbol)) or "none"
+
+
+RULES = (names, bounds, arrays, aliases, clocks, unit_meaning)

@@ -13,7 +13,7 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Booleans, Floats, Integers
 from orchestration.foundation.basics.times import nanoseconds, seconds
 from orchestration.simulation.engines.batch.arrays import BatchArrays, BatchStructures, aligned
-from orchestration.simulation.engines.batch.combining import combined
+from orchestration.simulation.engines.batch.folds import combined
 from orchestration.simulation.engines.batch.initialisation import Initialisation
 from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, RunNumbers
 from orchestration.simulation.engines.batch.shape import Shape

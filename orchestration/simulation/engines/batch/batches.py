@@ -11,7 +11,7 @@ from orchestration.foundation.basics.records import replaced
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import seconds
 from orchestration.simulation.engines.batch.batch import Batch, BatchResult, Group
-from orchestration.simulation.engines.batch.combining import combined
+from orchestration.simulation.engines.batch.folds import combined
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.run_numbers import NO_COLUMNS, ParameterColumns, end_of
 from orchestration.simulation.engines.batch.shape import Shape, outline

@@ -9,13 +9,15 @@ from pathlib import Path
 import pytest
 
 from orchestration.components.checks.doctor.binaries import LINUX, MACOS, WINDOWS, read
-from orchestration.components.checks.doctor.loader import DynamicLoader, loader_of_programs, loader_of_this_python
 from orchestration.components.checks.doctor.machine import this_machine
 from orchestration.components.checks.doctor.pythons import (
     ON_PATH,
     PRELOADED,
     THIS_PYTHON,
+    DynamicLoader,
     PythonLibrary,
+    loader_of_programs,
+    loader_of_this_python,
     python_libraries,
 )
 from tests.orchestration.components.checks.doctor.common import (
