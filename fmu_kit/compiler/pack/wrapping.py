@@ -6,6 +6,7 @@ The code runs once while its FMU is made, for its start values. So this is a sep
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -31,6 +32,7 @@ from fmu_kit.compiler.pack.lanes import MAIN, USER_OBJECT
 from fmu_kit.compiler.pack.user_objects import Objects, RefusedCodeError, build_objects, libraries
 from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.interface import FixedParameter, Input, Output
+from fmu_kit.libraries import cached_content
 from fmu_kit.new_files import WriteError
 from fmu_kit.scratch import temporary_folder
 from fmu_kit.slave import Slave
@@ -103,8 +105,9 @@ def build(code: UserCode, out: Path, version: int = 2, systems: Sequence[str] = 
 
 
 def _library(code: UserCode, sources: Mapping[str, bytes], main: str) -> bytes:
-    options = [*c_compiler.OF_LIBRARY, "-Wl,-Bsymbolic", "-Wl,-z,defs", USER_OBJECT, *libraries(code)]
-    return c_compiler.compiled_here(sources, main, options=options, has_lines=True)
+    options = (*c_compiler.OF_LIBRARY, "-Wl,-Bsymbolic", "-Wl,-z,defs", USER_OBJECT, *libraries(code))
+    compile_ = functools.partial(c_compiler.compiled_here, sources, main, options=options, has_lines=True)
+    return cached_content("native", sources, (c_compiler.OPTIONS, options, main), compile_)
 
 
 def _starts(code: UserCode, objects: Objects, folder: Path) -> list[float]:
