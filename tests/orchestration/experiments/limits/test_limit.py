@@ -37,7 +37,7 @@ from orchestration.systems.system.model import System
 from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
 from quadcosim import Result, Scenario, Timing, UsageError
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.extent import sample
 from tests.fmus import source_tree
 from tests.native import NATIVE

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from scipy.optimize import minimize
 
+from orchestration.components.building import fmus
 from orchestration.experiments.studies.axes import Axis
 from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
 from orchestration.experiments.tuning.tune import Tuned, tune
@@ -24,7 +25,7 @@ GAINS = "components.controller.parameters"
 def tuning(**changes: object) -> ExactTuning:
     loaded = load_tuning(FILE)
     assert isinstance(loaded, ExactTuning)
-    return replace(loaded, **changes)  # type: ignore[arg-type]
+    return replace(loaded, **{"base": fmus.native_twins(loaded.base), **changes})  # type: ignore[arg-type]
 
 
 def tuned(problem: ExactTuning, folder: Path) -> Tuned:

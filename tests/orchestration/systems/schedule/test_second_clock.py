@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given, reject, settings
+from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from orchestration.foundation.basics.errors import UsageError
@@ -137,7 +137,6 @@ def test_both_clocks_agree_over_random_timings_of_the_quadrotor(data: st.DataObj
     same(flight(data.draw(cases(**sensors, hold=data.draw(st.sampled_from(["zero", "first"]))))))
 
 
-@settings(max_examples=20)
 @given(st.data())
 def test_both_clocks_agree_with_the_controllers_own_clock(data: st.DataObject) -> None:
     period = data.draw(st.sampled_from([0.01, 0.025, 0.1]))

@@ -15,7 +15,7 @@ from orchestration.theory.certificates.basin import Basin, basin, largest_basin
 from orchestration.theory.certificates.check_file import check_certificate
 from orchestration.theory.certificates.family import Letter
 from orchestration.theory.certificates.verify_certificate import NotProven
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.orchestration.theory.certificates.loops import late_command
 
 

@@ -29,7 +29,7 @@ from orchestration.theory.certificates.margin import Certified, linear_loop_of, 
 from orchestration.theory.certificates.region import margin_region
 from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.exact.loops import Loops
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 
 LOGGER = "computers.node.tasks.logger.execution"
 OWN = "computers.node.tasks.control.execution"

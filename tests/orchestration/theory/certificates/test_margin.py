@@ -27,7 +27,7 @@ from orchestration.theory.certificates.verify_certificate import verified
 from orchestration.theory.stability import delay_bounds
 from orchestration.theory.stability.delay_bounds import breaking_jitter
 from quadcosim import Timing
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.extent import in_test_all, sample
 from tests.native import native
 from tests.orchestration.experiments.studies.common import one_line
@@ -228,7 +228,7 @@ def test_the_command_writes_what_it_checks(
 ) -> None:
     monkeypatch.setattr(certificates, "SHARES", (0.95,))
     file = EXAMPLES / "double_integrator" / "system.toml"
-    slow, other = (("--set", f"components.controller.sampling.period={period}") for period in (1.0, 0.9))
+    slow, other = (("--native", "--set", f"components.controller.sampling.period={period}") for period in (1.0, 0.9))
     path = tmp_path / "certificate.json"
     document = json.loads(output_of(capsys, "margin", file, *slow, "--of", COMMAND, "--out", path, "--json"))
     assert document["certified"] == pytest.approx(0.95 * document["breaking"], rel=1e-6)

@@ -28,7 +28,7 @@ from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.period_map import growth_of_loop
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.extent import sample
 from tests.orchestration.theory.certificates.loops import through_a_filter
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orchestration.components.building import fmus
 from orchestration.components.scaffold.folder import write
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.file import load_system
@@ -154,9 +155,8 @@ def test_a_start_at_which_a_component_is_not_linear_is_refused_by_name() -> None
 def test_the_cost_from_a_pendulum_that_leans_is_linear_theory_and_says_how_far_it_is_off(tmp_path: Path) -> None:
     write("plant", "pendulum", tmp_path, author="Ada", license="MIT")
     objectives = {"cost": "mean((plant.angle - 3.141592653589793) ** 2)"}
-    upright = dataclasses.replace(
-        load_system(tmp_path / "pendulum" / "system.toml"), objectives=objectives, criterion=Criterion()
-    )
+    written = fmus.native_twins(load_system(tmp_path / "pendulum" / "system.toml"))
+    upright = dataclasses.replace(written, objectives=objectives, criterion=Criterion())
 
     def leaning(by: float) -> Expected:
         return expect(changed(upright, {"components.plant.parameters.initial.angle": math.pi + by}), horizon=1.0)

@@ -20,7 +20,7 @@ from orchestration.theory.stability.lifted_margins import gain_margins, lifted_g
 from orchestration.theory.stability.loop_halves import closed, sensitivity_of
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.extent import sample
 from tests.orchestration.experiments.studies.test_systems import DELAY
 from tests.places import EXAMPLES
@@ -295,7 +295,7 @@ def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
 
 def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Path) -> None:
     file = EXAMPLES / "dc_servo" / "system.toml"
-    document = json.loads(main("bode", file, "--json", "--out", tmp_path).stdout)
+    document = json.loads(main("bode", file, "--native", "--json", "--out", tmp_path).stdout)
     drawn = {"outputs", "frequencies", "gains", "phases"}
     assert document.keys() == {"verdict", "dt", "stable", "sensitivity_peak", "loops", *drawn}
     (gains,), (phases,), at = document["gains"], document["phases"], document["frequencies"]
@@ -307,7 +307,7 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
         "stable, sampled every 6 ms: gain margins 0.169 and 3.25, phase margin 33.7°, delay margin 11.5 ms "
         "(small deviations)"
     )
-    stepped = json.loads(main("step", file, "--json", "--out", tmp_path).stdout)
+    stepped = json.loads(main("step", file, "--native", "--json", "--out", tmp_path).stdout)
     assert {"rise_time", "overshoot", "settling_time", "steady_state"} < stepped.keys()
     assert stepped["verdict"].startswith("a step on controller.u settles in 300 ms, overshoot 54.7 %, 100 % taken back")
     of_floats = [dataclasses.replace(one, in_double=("a", "b")) for one in (step_of("dc_servo"), bode_of("dc_servo"))]

@@ -12,14 +12,13 @@ import pytest
 import quadcosim
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.unit_algebra import time_text
-from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.state_space import reduced
 from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, linearise
 from tests.commands import Main
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.native import native
 from tests.orchestration.experiments.studies.test_systems import DELAY, PERIOD
 from tests.places import EXAMPLES
@@ -164,13 +163,14 @@ def test_without_python_control_one_line_names_the_extra(monkeypatch: pytest.Mon
 
 def test_the_command_writes_the_matrices_that_python_has(main: Main) -> None:
     file = EXAMPLES / "double_integrator" / "system.toml"
-    loop, document = linearise(load_system(file)), json.loads(main("linearise", file, "--json").stdout)
+    loop = linearise(example("double_integrator"))
+    document = json.loads(main("linearise", file, "--native", "--json").stdout)
     assert document["name"] == loop.name
     for half, found in (("component", loop.component), ("rest", loop.rest)):
         written = document[half]
         assert {name: written[name] for name in "ABCD"} == {name: getattr(found, name).tolist() for name in "ABCD"}
         assert (written["dt"], written["inputs"], written["outputs"]) == (found.dt, [*found.inputs], [*found.outputs])
     assert loop.radius == pytest.approx(np.abs(np.linalg.eigvals(closed(loop))).max(), rel=1e-9)
-    lines = main("linearise", file).stdout.splitlines()
+    lines = main("linearise", file, "--native").stdout.splitlines()
     assert lines[0].startswith(f"stable: spectral radius {loop.radius:.4g}, sampled every ")
     assert lines[2].endswith(f"{len(loop.rest.A)} states, every {time_text(loop.rest.dt)}")

@@ -17,7 +17,7 @@ from orchestration.theory.stability.matrices import (
     in_output_coordinates,
     of_samples,
 )
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 
 
 @pytest.fixture(scope="module")

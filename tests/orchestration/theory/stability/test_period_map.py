@@ -27,7 +27,7 @@ from orchestration.theory.stability.loop_at_rest import AnyTangent, AtRest, Know
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import Growth, growth_of
 from quadcosim import Scenario, Timing, UsageError
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.native import native
 from tests.orchestration.components.fmi.small import needs_compiler, small
 from tests.orchestration.experiments.studies.common import one_line

@@ -11,17 +11,18 @@ from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
-from quadcosim import UsageError, bode, linearise, locus
+from quadcosim import Timing, UsageError, bode, linearise, locus
 from tests.commands import Main
-from tests.examples.common import example
+from tests.examples.common import native_example as example
+from tests.native import native
 from tests.orchestration.experiments.studies.test_systems import DELAY
 from tests.places import EXAMPLES
 
 
 def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_margin(main: Main, tmp_path: Path) -> None:
     file = EXAMPLES / "dc_servo" / "system.toml"
-    command = ("locus", file, "--of", DELAY, "--from", "0", "--to", "0.02", "--count", "3", "--json", "--out", tmp_path)
-    found = json.loads(main(*command).stdout)
+    values = ("--of", DELAY, "--from", "0", "--to", "0.02", "--count", "3")
+    found = json.loads(main("locus", file, *values, "--native", "--json", "--out", tmp_path).stdout)
     assert found["values"] == [0.0, 0.01, 0.02]
     assert found["verdict"] == (
         f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations)"
@@ -48,7 +49,7 @@ def test_a_loop_sampled_between_whole_nanoseconds_has_the_radius_of_its_neighbou
 
 def test_a_response_that_grows_until_it_cannot_be_followed_hides_no_poles() -> None:
     """That to one input, over four times the period; not beside it: radii at 0.3857 and 0.3858 s are those below."""
-    assert 33.0031 < linearise({"timing": {"period": 0.385769231}}).radius < 33.0229
+    assert 33.0031 < linearise(native(timing=Timing(period=0.385769231))).radius < 33.0229
 
 
 def test_what_is_forgotten_is_no_pole() -> None:
