@@ -22,7 +22,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.linearise import Linearised
-from orchestration.theory.stability.loop_halves import places, radius, sensitivity_of, with_rest
+from orchestration.theory.stability.loop_halves import Sensitivity, places, radius, sensitivity_of, with_rest
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.sign_changes import zero_between
 from orchestration.theory.stability.state_space import StateSpace, reduced
@@ -115,8 +115,10 @@ class LateCommand:
     late: Late
     known: dict[float, Linearised] = field(default_factory=dict)
     """The loop, by the part of a sample by which the command is late"""
-    soon: dict[float, Complexes] = field(default_factory=dict)
+    sensitivities: dict[float, Sensitivity] = field(default_factory=dict)
     """The sensitivity of that command over its samples"""
+    soon: dict[float, Complexes] = field(default_factory=dict)
+    """That at the frequencies"""
 
     @property
     def sides(self) -> list[float]:
@@ -170,7 +172,7 @@ class LateCommand:
             if not apart.any():
                 break
             between = 0.5 * (frequencies[:-1] + frequencies[1:])[apart]
-            added = self._difference(sensitivity_of(self._late_by(part), self.i, between), whole, between)
+            added = self._difference(self._sensitivity(part)(between), whole, between)
             order = np.argsort(frequencies := np.append(frequencies, between))
             frequencies, difference = frequencies[order], np.concatenate([difference, added])[order]
         return frequencies, difference
@@ -197,8 +199,13 @@ class LateCommand:
 
     def _soon(self, part: float) -> Complexes:
         if part not in self.soon:
-            self.soon[part] = sensitivity_of(self._late_by(part), self.i, self.frequencies)
+            self.soon[part] = self._sensitivity(part)(self.frequencies)
         return self.soon[part]
+
+    def _sensitivity(self, part: float) -> Sensitivity:
+        if part not in self.sensitivities:
+            self.sensitivities[part] = sensitivity_of(self._late_by(part), self.i)
+        return self.sensitivities[part]
 
     def _split(self, delay: float) -> tuple[int, float]:
         """Whole samples, and the part of one [s]."""

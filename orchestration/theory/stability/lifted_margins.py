@@ -15,9 +15,9 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability.linearise import Linearised
-from orchestration.theory.stability.loop_halves import places, radius, sensitivity_of
+from orchestration.theory.stability.loop_halves import Sensitivity, places, radius, sensitivity_of
 from orchestration.theory.stability.poles import Complexes
-from orchestration.theory.stability.sign_changes import root
+from orchestration.theory.stability.sign_changes import roots
 
 LEAST = 1e-6
 """Least factor that is a gain margin, and the inverse of the largest"""
@@ -33,7 +33,7 @@ def lifted_gains(loop: Linearised, i: int, frequencies: Floats) -> tuple[Complex
     That is by the norm of a signal over all samples. Both follow from the closed loop: beside whole turns in a period
     rounding would decide on what the halves have, by poles of 1, as of a position.
     """
-    sensitivity = sensitivity_of(loop, i, frequencies)
+    sensitivity = sensitivity_of(loop, i)(frequencies)
     values, vectors = np.linalg.eig(sensitivity)
     harmonic = np.exp(-1j * np.outer(frequencies * loop.dt, np.arange(loop.samples)))
     chosen = np.abs(np.einsum("nj,njk->nk", harmonic, vectors)).argmax(axis=1)
@@ -46,16 +46,15 @@ def gain_margins(loop: Linearised, i: int, frequencies: Floats) -> list[tuple[fl
 
     Each with its frequency [rad/s]; a missing one: none is known. `frequencies` go up to half the rate of the period.
     """
-    ends = ((w, s) for w in (0.0, math.pi / loop.rest.dt) for s in _sensitivities(loop, i, w) if abs(s.imag) < PASSED)
-    found = [
-        (float((s / (s - 1.0)).real), w, s) for w, s in [*ends, *_passing(loop, i, frequencies, np.imag)] if _counts(s)
-    ]
+    of = sensitivity_of(loop, i)
+    ends = ((w, s) for w in (0.0, math.pi / loop.rest.dt) for s in _values(of, w) if abs(s.imag) < PASSED)
+    found = [(float((s / (s - 1.0)).real), w, s) for w, s in [*ends, *_passing(of, frequencies, np.imag)] if _counts(s)]
     nearest = sorted((one for one in found if one[0] > 0.0), key=lambda one: abs(math.log(one[0])))
     margins = list[tuple[float, float]]()
     for side in (-1.0, 1.0):
         of_side = (one for one in nearest if side * (one[0] - 1.0) > 0.0)
         for factor, w, s in islice((one for one in of_side if _ends_stability(loop, i, one[0])), 1):
-            margins.append((factor, abs(_frequency_of(loop, i, w, s))))
+            margins.append((factor, abs(_frequency_of(loop, of, w, s))))
     return margins
 
 
@@ -64,40 +63,37 @@ def phase_margin(loop: Linearised, i: int, frequencies: Floats) -> tuple[float, 
 
     Negative: it is ahead. None: no turn makes it unstable. `frequencies` go up to half the rate of the period.
     """
-    found = [(float(np.angle(1.0 - 1.0 / s)), w, s) for w, s in _passing(loop, i, frequencies, lambda s: s.real - 0.5)]
+    of = sensitivity_of(loop, i)
+    found = [(float(np.angle(1.0 - 1.0 / s)), w, s) for w, s in _passing(of, frequencies, lambda s: s.real - 0.5)]
     if not found:
         return None
     turn, w, s = min(found, key=lambda one: abs(one[0]))
-    frequency = _frequency_of(loop, i, w, s)
+    frequency = _frequency_of(loop, of, w, s)
     return math.copysign(1.0, frequency) * turn, abs(frequency)
 
 
-def _passing(
-    loop: Linearised, i: int, frequencies: Floats, part: Callable[[Any], Any]
-) -> Iterator[tuple[float, complex]]:
+def _passing(of: Sensitivity, frequencies: Floats, part: Callable[[Any], Any]) -> Iterator[tuple[float, complex]]:
     """Frequencies at which a part of a sensitivity, an eigenvalue over all samples, passes 0, with that sensitivity."""
-    values = np.linalg.eigvals(sensitivity_of(loop, i, frequencies))
+    values = np.linalg.eigvals(of(frequencies))
     before, after = values[:-1], values[1:]
     nearest = np.abs(after[:, None, :] - before[:, :, None]).argmin(axis=2)
     after = np.take_along_axis(after, nearest, axis=1)
-    for place, which in zip(*np.nonzero((part(before) * part(after) < 0.0) & _counts(before))):
-        course = before[place, which], after[place, which]
-        w, sensitivity = _followed(loop, i, frequencies[place : place + 2], course, part)
+    place, which = np.nonzero((part(before) * part(after) < 0.0) & _counts(before))
+    if not len(place):
+        return
+    low, high = frequencies[place], frequencies[place + 1]
+    start, change = before[place, which], after[place, which] - before[place, which]
+
+    def at(w: Floats) -> Complexes:
+        """Each on its course between two frequencies."""
+        values, expected = np.linalg.eigvals(of(w)), start + (w - low) / (high - low) * change
+        chosen = np.abs(values - expected[:, None]).argmin(axis=1)
+        return np.asarray(np.take_along_axis(values, chosen[:, None], axis=1)[:, 0])
+
+    passed = roots(lambda w: part(at(w)), low, high)
+    for w, sensitivity in zip(passed.tolist(), at(passed).tolist()):
         if abs(part(sensitivity)) < PASSED:
             yield w, sensitivity
-
-
-def _followed(
-    loop: Linearised, i: int, ends: Floats, course: tuple[complex, complex], part: Callable[[Any], Any]
-) -> tuple[float, complex]:
-    """Where a part of a sensitivity passes 0 on its course between two frequencies."""
-
-    def at(w: float) -> complex:
-        values, share = _sensitivities(loop, i, w), (w - ends[0]) / (ends[1] - ends[0])
-        return complex(values[np.abs(values - (1.0 - share) * course[0] - share * course[1]).argmin()])
-
-    w = root(lambda w: part(at(w)), *map(float, ends))
-    return w, at(w)
 
 
 def _counts(sensitivity: Any) -> Any:
@@ -105,8 +101,8 @@ def _counts(sensitivity: Any) -> Any:
     return (np.abs(sensitivity) > LEAST) & (np.abs(sensitivity - 1.0) > LEAST)
 
 
-def _sensitivities(loop: Linearised, i: int, frequency: float) -> Complexes:
-    return np.asarray(np.linalg.eigvals(sensitivity_of(loop, i, np.array([frequency]))[0]))
+def _values(of: Sensitivity, frequency: float) -> Complexes:
+    return np.asarray(np.linalg.eigvals(of(np.array([frequency]))[0]))
 
 
 def _ends_stability(loop: Linearised, i: int, factor: float) -> bool:
@@ -121,9 +117,9 @@ def _radius_with(loop: Linearised, i: int, factor: float) -> float:
     return radius(loop, factors)
 
 
-def _frequency_of(loop: Linearised, i: int, w: float, sensitivity: complex) -> float:
+def _frequency_of(loop: Linearised, of: Sensitivity, w: float, sensitivity: complex) -> float:
     """That of which a command has most [rad/s], with whole turns in a period, negative if it turns backward."""
-    values, vectors = np.linalg.eig(sensitivity_of(loop, i, np.array([w]))[0])
+    values, vectors = np.linalg.eig(of(np.array([w]))[0])
     command = vectors[:, np.abs(values - sensitivity).argmin()]
     at = w + 2.0 * math.pi / loop.rest.dt * (np.arange(loop.samples) - loop.samples // 2)
     content = np.abs(np.exp(-1j * np.outer(at, np.arange(loop.samples)) * loop.dt) @ command)

@@ -1,5 +1,6 @@
 """The two halves of a loop that is cut open, closed again: poles, commands, and what a step on commands does."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.theory.stability.linearise import Linearised
 from orchestration.theory.stability.poles import Complexes
+from orchestration.theory.stability.resolvent import Resolvent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,9 +54,13 @@ def places(loop: Linearised, i: int) -> Integers:
     return i + count * np.arange(loop.samples)
 
 
-def sensitivity_of(loop: Linearised, i: int, frequencies: Floats) -> Complexes:
-    """A command by what is added to it, both at all of its samples, the loop closed, shape (n, samples, samples)."""
-    z, whole, own = np.exp(1j * frequencies * loop.rest.dt), closed(loop), places(loop, i)
-    added = whole.steps[:, own].astype(complex)
-    states = np.linalg.solve(z[:, None, None] * np.eye(len(whole.A)) - whole.A, added[None])
-    return np.asarray(np.eye(len(own)) + whole.direct[np.ix_(own, own)] + whole.commands[own] @ states)
+Sensitivity = Callable[[Floats], Complexes]
+"""A command by what is added to it, both at all of its samples, by frequencies [rad/s], shape (n, samples, samples)"""
+
+
+def sensitivity_of(loop: Linearised, i: int) -> Sensitivity:
+    """That of a command, the loop closed."""
+    whole, own = closed(loop), places(loop, i)
+    direct = np.eye(len(own)) + whole.direct[np.ix_(own, own)]
+    by_states = Resolvent.of(whole.A, whole.steps[:, own], whole.commands[own])
+    return lambda frequencies: direct + by_states.at(np.exp(1j * frequencies * loop.rest.dt))

@@ -46,7 +46,7 @@ def _as_pole(z: complex, dt: float) -> Pole:
 
 def poles_of(matrix: Floats) -> Complexes:
     """The eigenvalues of a matrix without those at 0, which rounding would scatter where they are multiple."""
-    matrix = _balanced(matrix)
+    matrix, _ = balanced(matrix)
     while len(matrix):
         left, sizes, _ = np.linalg.svd(matrix)
         rank = int((sizes > NO_RANK * max(1.0, float(sizes[0]))).sum())
@@ -57,8 +57,9 @@ def poles_of(matrix: Floats) -> Complexes:
     return found[np.argsort(-np.abs(found), kind="stable")]
 
 
-def _balanced(matrix: Floats) -> Floats:
-    """The same map with states in units, powers of two, in which each moves others as much as they move it."""
+def balanced(matrix: Floats) -> tuple[Floats, Floats]:
+    """The same map with states in units in which each moves others as much as they move it, and these powers of two."""
+    units = np.ones(len(matrix))
     for _ in range(BALANCINGS):
         others = np.abs(matrix - np.diag(np.diag(matrix)))
         moved, moves = others.sum(axis=1), others.sum(axis=0)
@@ -67,5 +68,5 @@ def _balanced(matrix: Floats) -> Floats:
         unit = 2.0 ** np.round(0.25 * np.log2(ratio))  # half the way, as all change at once
         if (unit == 1.0).all():
             break
-        matrix = matrix * unit[:, None] / unit
-    return matrix
+        matrix, units = matrix * unit[:, None] / unit, units * unit
+    return matrix, units

@@ -2,6 +2,10 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
+
 HALVINGS = 60
 ZERO = 1e-7
 """Size of a value, as the distance of a spectral radius from 1, that counts as 0"""
@@ -11,12 +15,13 @@ SECANTS = 12
 """Points from which on a range is only halved, as it is where the function jumps"""
 
 
-def root(of: Callable[[float], float], low: float, high: float) -> float:
-    """Where a continuous function passes 0 between two points, by halves."""
+def roots(of: Callable[[Floats], Floats], low: Floats, high: Floats) -> Floats:
+    """Where continuous functions, evaluated together, pass 0, each between two points, by halves."""
     rising = of(high) > of(low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if (of(middle) > 0.0) == rising else (middle, high)
+        passed = (of(middle) > 0.0) == rising
+        low, high = np.where(passed, low, middle), np.where(passed, middle, high)
     return 0.5 * (low + high)
 
 

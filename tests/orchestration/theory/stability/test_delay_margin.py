@@ -11,7 +11,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability import delay_margin as delay_margins
 from orchestration.theory.stability.delay_margin import Late, delay_margin
 from orchestration.theory.stability.linearise import Linearised
-from orchestration.theory.stability.loop_halves import radius, sensitivity_of
+from orchestration.theory.stability.loop_halves import Sensitivity, radius, sensitivity_of
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
 
@@ -112,9 +112,12 @@ def test_frequencies_of_several_samples_are_not_refined_for_gains_that_are_large
     """Those of a double integrator at low frequencies, whose samples together have a large gain in one direction."""
     points = list[int]()
 
-    def counted(loop: Linearised, i: int, frequencies: Floats) -> Complexes:
-        points.append(len(frequencies))
-        return sensitivity_of(loop, i, frequencies)
+    def counted(loop: Linearised, i: int) -> Sensitivity:
+        def sensitivity(frequencies: Floats) -> Complexes:
+            points.append(len(frequencies))
+            return sensitivity_of(loop, i)(frequencies)
+
+        return sensitivity
 
     monkeypatch.setattr(delay_margins, "sensitivity_of", counted)
     plant, gains, dt = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [[1.0, 1.4]] * 3, 0.05

@@ -18,6 +18,7 @@ from orchestration.theory.stability.delay_margin import Late, LateCommand, delay
 from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
 from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.loop_halves import closed, sensitivity_of
+from orchestration.theory.stability.resolvent import Resolvent
 from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import native_example as example
@@ -192,7 +193,20 @@ def test_a_loop_of_one_command_has_the_others_closed() -> None:
         return np.asarray(of.C @ np.linalg.solve(z * np.eye(len(of.A)) - of.A, of.B) + of.D)
 
     sensitivity = np.diag(np.linalg.inv(np.eye(3) - at(loop.component) @ at(loop.rest)))
-    assert [sensitivity_of(loop, i, np.array([7.0])).item() for i in range(3)] == pytest.approx(sensitivity, rel=1e-9)
+    assert [sensitivity_of(loop, i)(np.array([7.0])).item() for i in range(3)] == pytest.approx(sensitivity, rel=1e-9)
+
+
+@pytest.mark.parametrize("states", [0, 1, 2, 9])
+def test_the_answer_at_many_frequencies_is_that_of_a_solve_at_each(states: int) -> None:
+    """Of a map that Householder leaves alone in a column, with states in units far apart, and a multiple pole of 0."""
+    random, units = np.random.default_rng(2), np.geomspace(1.0, 1e6, states)
+    A, B, C = (random.normal(size=size) for size in ((states, states), (states, 2), (3, states)))
+    A[2:, :1] = 0.0
+    A[states // 2 :, 3:] = 0.0
+    A, B, C = units[:, None] * A / units, units[:, None] * B, C / units
+    z = 3.0 * np.exp(1j * np.linspace(0.0, np.pi, 300))
+    expected = C @ np.linalg.solve(z[:, None, None] * np.eye(states) - A, B.astype(complex)[None])
+    assert Resolvent.of(A, B, C).at(z) == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
 def test_beside_whole_turns_in_a_period_of_five_samples_gains_and_sensitivity_are_those_of_one() -> None:
