@@ -123,7 +123,9 @@ def component_named(system: System, component: str | None, to: str) -> str:
     if component is None:
         if len(sampled) != 1:
             listed = ", ".join(sampled or system.components)
-            raise UsageError(f"component: expected the one {to}, of the {len(sampled)} that are sampled: {listed}")
+            raise UsageError(
+                f"--component: expected the NAME of the one {to}, of the {len(sampled)} that are sampled: {listed}"
+            )
         component = sampled[0]
     if component not in system.components:
         raise UsageError(f"component: {component}: {expected_name(str(component), list(system.components))}")

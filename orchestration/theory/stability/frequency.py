@@ -29,6 +29,7 @@ from orchestration.theory.stability.linearise import (
     Linearised,
     clock_of,
     cut_open,
+    expect_sampled,
     in_isolation,
     rest_of_loop,
     sampled_component,
@@ -171,6 +172,7 @@ def bode(request: RequestLike, component: str | None = None) -> Bode:
 
     Raises `UsageError` as `linearise`, and for a loop whose stability rounding may decide.
     """
+    expect_sampled(request, component)
     for one, other, interval in stepped_couplings(system_of(request_of(request))):
         warn(
             f"{one} and {other} run in continuous time, and exchange every {quantity(interval, 's')}: the loop is that "

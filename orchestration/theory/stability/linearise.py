@@ -96,6 +96,7 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     Raises `UsageError` for a system that does not rest there, for FMUs that cannot save their state, and for a
     component that is not sampled. Where several rates meet, both halves go over a period of all.
     """
+    expect_sampled(request, component)
     return in_isolation(request, _linearised, component)
 
 
@@ -113,6 +114,12 @@ def _linearised(request: Request, component: str | None) -> Linearised:
         name = sampled_component(system, component)
         with progress_bar("linear models"), whole_at_rest(system, instances) as loop:
             return cut_open(loop, name)
+
+
+def expect_sampled(request: RequestLike, component: str | None) -> None:
+    """Raise `UsageError`, before any FMU is built, where no sampled component has that name, or several might."""
+    with errors_in_own_terms(asked := request_of(request)):
+        sampled_component(rested(asked), component)
 
 
 def sampled_component(system: System, component: str | None) -> str:

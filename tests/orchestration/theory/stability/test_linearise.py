@@ -16,7 +16,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.state_space import reduced
-from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, linearise
+from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, bode, linearise
 from tests.commands import Main
 from tests.examples.common import native_example as example
 from tests.native import native
@@ -135,11 +135,13 @@ def test_a_delay_over_more_samples_than_are_tried_first_keeps_all_its_states() -
         ("four_components", None, r"of the 3 that are sampled: sensor, controller, engine$"),
     ],
 )  # fmt: skip
-def test_a_component_at_which_no_loop_can_be_cut_open_is_refused(
-    name: str, component: str | None, expected: str
+def test_a_component_at_which_no_loop_can_be_cut_open_is_refused_before_anything_is_loaded(
+    monkeypatch: pytest.MonkeyPatch, name: str, component: str | None, expected: str
 ) -> None:
-    with pytest.raises(UsageError, match=expected):
-        linearise(example(name), component)
+    monkeypatch.setattr("orchestration.theory.stability.linearise.single_run_execution", None)
+    for of_loop in (linearise, bode):
+        with pytest.raises(UsageError, match=expected):
+            of_loop(example(name), component)
 
 
 def test_a_linearised_loop_is_a_system_of_python_control_with_its_names(system: System) -> None:
