@@ -11,7 +11,7 @@ from docs.pages import fill
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.simulation.figures import style
-from orchestration.simulation.interop import table
+from orchestration.simulation.interop import compare
 from orchestration.simulation.interop.catalogue import chosen
 from orchestration.simulation.interop.compare import agreements
 from orchestration.simulation.interop.figure import agreement_chart
@@ -35,7 +35,7 @@ def interop() -> None:
     with style.DOCS.applied():
         chart = agreement_chart(found)
     style.save({"interop": chart}, DOCS / "figures", style.DOCS)
-    fill(DOCS / "interop.md", {"masters": table.text(found)})
+    fill(DOCS / "interop.md", {"masters": compare.text(found)})
 
 
 def validation() -> None:

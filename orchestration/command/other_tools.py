@@ -96,7 +96,7 @@ def interop(
 
     Exit code 1 if a state of a tool differs by more than 1e-9 from this master's with the same first inputs.
     """
-    from orchestration.simulation.interop import table
+    from orchestration.simulation.interop import compare
     from orchestration.simulation.interop.catalogue import chosen
     from orchestration.simulation.interop.compare import agreements
     from orchestration.systems.system.request import system_of
@@ -110,11 +110,11 @@ def interop(
 
         for path in draw(found, out):
             inform(str(path))
-    far = [agreement.tool.name for agreement in found if not table.agrees(agreement)]
-    document = [table.as_dict(agreement) for agreement in found]
+    far = [agreement.tool.name for agreement in found if not compare.agrees(agreement)]
+    document = [compare.as_dict(agreement) for agreement in found]
     if far:
-        inform(f"farther than {table.TOLERANCE:g} from this project's master: {'; '.join(far)}")
-    verdict = verdicts.of_agreements(far, len(found), table.TOLERANCE)
+        inform(f"farther than {compare.TOLERANCE:g} from this project's master: {'; '.join(far)}")
+    verdict = verdicts.of_agreements(far, len(found), compare.TOLERANCE)
     return CommandResult(
-        document={"tools": document}, verdict=verdict, lines=table.text(found).splitlines(), good=not far
+        document={"tools": document}, verdict=verdict, lines=compare.text(found).splitlines(), good=not far
     )

@@ -1,4 +1,4 @@
-"""The same run in every tool and in this project's master, compared signal by signal."""
+"""The same run in every tool and in this project's master, compared signal by signal, and what a comparison says."""
 
 import math
 import os
@@ -20,6 +20,10 @@ from orchestration.systems.system.request import Request
 
 MISSING = 1
 """steps at the end that a tool may omit: some stop where the next step would end beyond it"""
+TOLERANCE = 1e-9
+"""largest difference of a state that counts as agreement [SI]"""
+
+_HEAD = ("tool", "order", "inputs of the first step", "steps", "ends at", "drift", "difference", "same first inputs")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,3 +136,51 @@ def _differences(tool: Tool, rows: Floats, runs: ToolRuns, own: Floats) -> dict[
         for name, value in found.items()
         if component_of(name) in components
     }
+
+
+def agrees(agreement: Agreement) -> bool:
+    """Whether the tool's run is this project's, if both have the same inputs in the first step."""
+    return agreement.largest(agreement.same_first_inputs)[0] <= TOLERANCE
+
+
+def text(agreements: Sequence[Agreement]) -> str:
+    """A Markdown table, a tool a row, its columns aligned."""
+    rows = [_HEAD, *map(_row, agreements)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |" for row in rows
+    ]
+    return "\n".join([lines[0], "|" + "|".join("-" * (width + 2) for width in widths) + "|", *lines[1:]])
+
+
+def as_dict(agreement: Agreement) -> dict[str, Any]:
+    """All results of a tool, in JSON types."""
+    trace = agreement.trace
+    return {
+        "tool": agreement.tool.name,
+        "versions": agreement.versions,
+        "order": trace.order,
+        "first_inputs": trace.first_exchange,
+        "steps": trace.steps,
+        "end": trace.end,
+        "drift": trace.drift,
+        "agrees": agrees(agreement),
+        "as_it_comes": agreement.as_it_comes,
+        "same_first_inputs": agreement.same_first_inputs,
+    }
+
+
+def _row(agreement: Agreement) -> tuple[str, ...]:
+    trace = agreement.trace
+    kinds = set(trace.first_exchange.values())
+    first = kinds.pop() if len(kinds) == 1 else ", ".join(f"{k}: {v}" for k, v in trace.first_exchange.items())
+    differences = (f"{value:.1e} {name}" for value, name in map(agreement.largest, agreement.both()))
+    return (
+        agreement.tool.name,
+        trace.order,
+        first,
+        str(trace.steps),
+        f"{trace.end:.15g} s",
+        f"{trace.drift:.0e} s",
+        *differences,
+    )

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, INDIGO, ORANGE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save
-from orchestration.simulation.interop.compare import Agreement
-from orchestration.simulation.interop.table import TOLERANCE
+from orchestration.simulation.interop.compare import TOLERANCE, Agreement
 from orchestration.systems.system.connection import component_of
 
 AIM = f"aim, $10^{{{math.log10(TOLERANCE):g}}}$"

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.signals.motions import require
 
 FOOT = 0.3048
 """Length of a foot [m]"""
@@ -42,10 +42,10 @@ class Dryden:
 
     def __post_init__(self) -> None:
         for name in ("airspeed", "step"):
-            _require(getattr(self, name) > 0.0, name, getattr(self, name), "a positive number")
-        _require(self.wind_speed >= 0.0, "wind_speed", self.wind_speed, "zero or a positive number")
+            require(getattr(self, name) > 0.0, name, getattr(self, name), "a positive number")
+        require(self.wind_speed >= 0.0, "wind_speed", self.wind_speed, "zero or a positive number")
         allowed = f"{LOWEST:g} to {HIGHEST:g} m, where the low-altitude model holds"
-        _require(LOWEST <= self.height <= HIGHEST, "height", self.height, allowed)
+        require(LOWEST <= self.height <= HIGHEST, "height", self.height, allowed)
 
     def intensities(self) -> tuple[float, float, float]:
         """σ_u, σ_v, σ_w [m/s]."""
@@ -112,8 +112,3 @@ class _Filter:
             x1, x2 = m11 * x1 + m12 * x2 + self._a * a, m22 * x2 - m12 * x1 + self._b * a + self._c * b
         self._state = x1, x2
         return 0.5 * self._intensity * (x1 + math.sqrt(3.0) * x2)
-
-
-def _require(condition: bool, name: str, value: object, expected: str) -> None:
-    if not condition:
-        raise UsageError(f"{name} = {value}: expected {expected}")

@@ -163,8 +163,8 @@ class Step:
     """the time that it takes [s]"""
 
     def __post_init__(self) -> None:
-        _require(self.start >= 0.0, "start", self.start, "zero or a positive number")
-        _require(self.duration > 0.0, "duration", self.duration, "a positive number")
+        require(self.start >= 0.0, "start", self.start, "zero or a positive number")
+        require(self.duration > 0.0, "duration", self.duration, "a positive number")
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
         """The motion between the two points."""
@@ -191,12 +191,12 @@ class _Periodic:
     """the time from rest to full speed [s]; 0: at full speed from the beginning"""
 
     def __post_init__(self) -> None:
-        _require(self.radius > 0.0, "radius", self.radius, "a positive number")
-        _require(self.ramp >= 0.0, "ramp", self.ramp, "zero or a positive number")
+        require(self.radius > 0.0, "radius", self.radius, "a positive number")
+        require(self.ramp >= 0.0, "ramp", self.ramp, "zero or a positive number")
         for name in ("period", "speed"):
             value = getattr(self, name)
-            _require(value is None or value > 0.0, name, value, "a positive number")
-        _require(self.period is None or self.speed is None, "speed", self.speed, "none beside period, or no period")
+            require(value is None or value > 0.0, name, value, "a positive number")
+        require(self.period is None or self.speed is None, "speed", self.speed, "none beside period, or no period")
 
     def rate(self, longest: float) -> float:
         """ω [rad/s]; at an angular rate of one the largest speed is `longest` [m/s]."""
@@ -263,7 +263,7 @@ class Paper:
     """the time from rest to full speed [s]"""
 
     def __post_init__(self) -> None:
-        _require(self.ramp >= 0.0, "ramp", self.ramp, "zero or a positive number")
+        require(self.ramp >= 0.0, "ramp", self.ramp, "zero or a positive number")
 
     def at(self, t: Scalar, ops: ScalarOps = FLOAT) -> Reference:
         """The motion on the paper's path."""
@@ -306,6 +306,7 @@ def _coordinates(reference: Reference) -> list[Derivatives]:
     return [Derivatives(*each) for each in zip(*orders)]
 
 
-def _require(condition: bool, name: str, value: object, expected: str) -> None:
+def require(condition: bool, name: str, value: object, expected: str) -> None:
+    """Raise `UsageError` naming the parameter, its value and what was expected, unless `condition` holds."""
     if not condition:
         raise UsageError(f"{name} = {value}: expected {expected}")

@@ -13,8 +13,7 @@ from orchestration.components.checks.validation.validator import validate
 from orchestration.components.fmi.read_description import read_model
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.simulation.interop.catalogue import chosen
-from orchestration.simulation.interop.compare import agreements
-from orchestration.simulation.interop.table import TOLERANCE
+from orchestration.simulation.interop.compare import TOLERANCE, agreements
 from quadcosim import Result, Scenario, UsageError, run
 from tests.commands import Main
 from tests.extent import sample

@@ -10,7 +10,7 @@ from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.quadrotor.scenarios.wiring import COMMAND, MEASUREMENT
-from orchestration.simulation.interop.table import TOLERANCE
+from orchestration.simulation.interop.compare import TOLERANCE
 from quadcosim import run
 from tests.native import NATIVE
 

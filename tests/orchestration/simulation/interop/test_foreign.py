@@ -6,8 +6,7 @@ import pytest
 
 from orchestration.simulation.interop import trace
 from orchestration.simulation.interop.catalogue import chosen
-from orchestration.simulation.interop.compare import agreements
-from orchestration.simulation.interop.table import TOLERANCE
+from orchestration.simulation.interop.compare import TOLERANCE, agreements
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
 from quadcosim import UsageError

@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from orchestration.simulation.interop import table
+from orchestration.simulation.interop import compare
 from orchestration.simulation.interop.catalogue import TOOLS, chosen
-from orchestration.simulation.interop.compare import Agreement, agreements
-from orchestration.simulation.interop.table import TOLERANCE, agrees
+from orchestration.simulation.interop.compare import TOLERANCE, Agreement, agreements, agrees
 from quadcosim import QuadcosimError, Scenario, UsageError
 from tests.extent import sample
 from tests.native import NATIVE
@@ -98,7 +97,7 @@ def test_the_page_has_the_table_that_was_found(compared: Compared) -> None:
 
     there = rows(block)
     assert [row[0] for row in there[1:]] == list(TOOLS)
-    assert [row for row in there if row[0] in {"tool", *found}] == rows(table.text(list(found.values())))
+    assert [row for row in there if row[0] in {"tool", *found}] == rows(compare.text(list(found.values())))
 
 
 def test_the_order_of_each_tool_is_as_stated(one: One) -> None:

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from orchestration.simulation.interop.catalogue import TOOLS, chosen
-from orchestration.simulation.interop.compare import agreements
-from orchestration.simulation.interop.table import TOLERANCE
+from orchestration.simulation.interop.compare import TOLERANCE, agreements
 from orchestration.simulation.interop.tool_runs import ToolRuns
 from orchestration.simulation.runs.simulation import run
 from orchestration.systems.system.model import System

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestration.simulation.interop import figure, table
+from orchestration.simulation.interop import compare, figure
 from orchestration.simulation.interop.catalogue import TOOLS
 from orchestration.simulation.interop.compare import Agreement
 from tests.orchestration.simulation.interop.common import agreement
@@ -30,7 +30,7 @@ def test_a_tool_agrees_up_to_1e_9_in_every_state_from_the_same_start(difference:
     found = agreement(same_first_inputs=0.0)
     for name in [name for name in found.same_first_inputs if name.startswith("plant.")]:
         found.same_first_inputs[name] = difference
-        assert table.agrees(found) == holds
+        assert compare.agrees(found) == holds
         found.same_first_inputs[name] = 0.0
 
 
@@ -40,18 +40,18 @@ def test_the_command_counts_only_where_no_plant_is_run() -> None:
         found.same_first_inputs.update(
             {name: 1.0 for name in found.same_first_inputs if name.startswith("controller.")}
         )
-        assert table.agrees(found) == holds
+        assert compare.agrees(found) == holds
 
 
 def test_how_it_comes_does_not_count() -> None:
-    assert table.agrees(agreement(as_it_comes=1.0))
+    assert compare.agrees(agreement(as_it_comes=1.0))
 
 
 # -- text and JSON ----------------------------------------------------------------------------------------
 
 
 def test_the_text_is_a_markdown_table_with_a_row_for_each_tool() -> None:
-    head, rule, *rows = table.text(SEVERAL).splitlines()
+    head, rule, *rows = compare.text(SEVERAL).splitlines()
     assert len(rows) == len(SEVERAL)
     columns = cells(head)
     assert columns[:3] == ["tool", "order", "inputs of the first step"]
@@ -62,7 +62,7 @@ def test_the_text_is_a_markdown_table_with_a_row_for_each_tool() -> None:
 
 
 def test_a_row_says_what_was_found() -> None:
-    text = table.text(SEVERAL).splitlines()
+    text = compare.text(SEVERAL).splitlines()
     assert cells(text[3]) == [
         "libcosim", "jacobi", "exchanged", "3000", "30 s", "2e-12 s",
         "3.0e-14 plant.velocity.z", "3.0e-14 plant.velocity.z",
@@ -79,7 +79,7 @@ def cells(row: str) -> list[str]:
 
 def test_all_that_was_found_is_there_in_json_types() -> None:
     for found in SEVERAL:
-        document = table.as_dict(found)
+        document = compare.as_dict(found)
         assert json.loads(json.dumps(document)) == document
         assert document["tool"] == found.tool.name
         assert document["versions"].keys() == set(found.tool.packages)
@@ -92,7 +92,7 @@ def test_all_that_was_found_is_there_in_json_types() -> None:
         )
         assert document["first_inputs"] == found.trace.first_exchange
         assert (document["as_it_comes"], document["same_first_inputs"]) == found.both()
-    assert table.as_dict(agreement(same_first_inputs=1e-8))["agrees"] is False
+    assert compare.as_dict(agreement(same_first_inputs=1e-8))["agrees"] is False
 
 
 # -- the chart --------------------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ def test_a_difference_of_zero_is_drawn_at_the_left_of_a_logarithmic_axis(tmp_pat
     (panel,) = figure.agreement_chart(found).axes
     assert panel.get_xscale() == "log"
     low, high = panel.get_xlim()
-    assert 0.0 < low < figure.ZERO_DRAWN_AT < table.TOLERANCE < high
+    assert 0.0 < low < figure.ZERO_DRAWN_AT < compare.TOLERANCE < high
 
 
 def test_the_chart_is_written_into_a_folder_that_need_not_be_there(tmp_path: Path) -> None:

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from orchestration.simulation.interop.catalogue import Tool, chosen
-from orchestration.simulation.interop.compare import Agreement, agreements
-from orchestration.simulation.interop.table import TOLERANCE, agrees
+from orchestration.simulation.interop.compare import TOLERANCE, Agreement, agreements, agrees
 from orchestration.simulation.requests.ssp import writing
 from orchestration.systems.system.model import System
 from quadcosim import Scenario, load_scenario
