@@ -204,6 +204,8 @@ class MapCell:
     """Sentence of its value and interval"""
     runs: tuple[int, ...]
     """Indices of its runs in the design"""
+    others: tuple[int, ...] = ()
+    """Those of its runs of a second study"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,11 +228,11 @@ class RepeatedMaps:
 
 @dataclass(frozen=True, kw_only=True)
 class OtherStudy:
-    """A second study over the same axes, drawn over the first."""
+    """A second study over the same axes, drawn over the first, or beside it if both repeat."""
 
     name: str
     table: ReportTable
-    """Its runs, without metrics"""
+    """Its runs, if both repeat with their metrics"""
     shares: tuple[Shares, ...]
 
 

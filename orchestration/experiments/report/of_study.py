@@ -101,8 +101,8 @@ def study_report(
     if other is None:
         repeated = repeated_maps(runs)
     else:
-        over = _over(*other, axes=axes, of=name, blobs=blobs)
         repeated = maps_of_both((name, runs), (other[0], runs_in_cells(other[2], other[1].rows, axes)))
+        over = _over(*other, axes=axes, of=name, blobs=blobs, metrics=() if repeated is None else stored.metrics)
     return Report(
         kind="study",
         title=name,
@@ -126,7 +126,7 @@ def study_report(
             if repeated is None and (along := _along(axis, stored, study)) is not None
         ),
         repeated=repeated,
-        other=None if other is None or repeated is not None else over,
+        other=None if other is None else over,
         contents=tuple(embedded.contents),
         provenance=tuple(provenance_of(stored.about)),
         command=command,
@@ -134,8 +134,16 @@ def study_report(
 
 
 def _over(
-    name: str, stored: Stored, study: Study | None, *, axes: Sequence[ColumnAxis], of: str, blobs: Blobs
+    name: str,
+    stored: Stored,
+    study: Study | None,
+    *,
+    axes: Sequence[ColumnAxis],
+    of: str,
+    blobs: Blobs,
+    metrics: Sequence[str],
 ) -> OtherStudy:
+    """A second study with some metrics of its runs; raises `UsageError` for one over other axes."""
     own = {axis.name: axis for axis in axes_of(stored, study)}
     if {*own} != {axis.name for axis in axes}:
         listed = ", ".join(axis.name for axis in axes)
@@ -143,8 +151,9 @@ def _over(
             f"{name}: its axes are {', '.join(own)}; expected those of {of}, over which it is drawn: {listed}"
         )
     shares = (_along(axis, stored, study) for axis in axes)
+    known = [name for name in metrics if name in stored.metrics]
     table = report_table(
-        stored.rows, axes, (), stored.units, blobs, tracks={}, messages={},
+        stored.rows, axes, known, stored.units, blobs, tracks={}, messages={},
         is_grid=json.loads(stored.about.get("grid", "null")) is not None,
     )  # fmt: skip
     return OtherStudy(name=name, table=table, shares=tuple(along for along in shares if along is not None))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.report.model import CellMap, MapCell, RepeatedMaps
@@ -82,7 +82,8 @@ def repeated_maps(runs: RunsInCells | None) -> RepeatedMaps | None:
 def maps_of_both(first: tuple[str, RunsInCells | None], second: tuple[str, RunsInCells | None]) -> RepeatedMaps | None:
     """The maps of two studies over the same axes, by their names, and last those of their difference, one of each law.
 
-    Cells of the second open no runs. None if neither repeats; raises `UsageError` if only one does, or over other axes.
+    Cells open runs of the first, and list those of the second. None if neither repeats; raises `UsageError` if only one
+    does, or over other axes.
     """
     import pandas as pd
 
@@ -95,54 +96,69 @@ def maps_of_both(first: tuple[str, RunsInCells | None], second: tuple[str, RunsI
     differences = differences_of(both, [STUDY, *one.by], TwoLaws(STUDY, FIRST, SECOND))
     maps = [
         *share_maps(one, f"{name}: share {one.word}"),
-        *share_maps(other, f"{name_of_other}: share {other.word}", opens=False),
-        *_maps(one, differences, f"difference, {name_of_other} minus {name}", one.table, is_difference=True),
+        *share_maps(other, f"{name_of_other}: share {other.word}", is_other=True),
+        *_maps(
+            one, differences, f"difference, {name_of_other} minus {name}", one.table, other.table, is_difference=True
+        ),
     ]
     return RepeatedMaps(across=one.across.name, up=one.up.name, maps=tuple(maps))
 
 
-def share_maps(runs: RunsInCells, title: str, *, opens: bool = True) -> list[CellMap]:
-    """The shares of good runs in the cells, a map for each law; whether cells open their runs."""
-    return _maps(runs, cells_of(runs.table, runs.by), title, runs.table if opens else runs.table[:0])
+def share_maps(runs: RunsInCells, title: str, *, is_other: bool = False) -> list[CellMap]:
+    """The shares of good runs in the cells, a map for each law; whether they are those of a second study."""
+    none, found = runs.table[:0], cells_of(runs.table, runs.by)
+    return _maps(runs, found, title, *((none, runs.table) if is_other else (runs.table, none)))
 
 
 def difference_map(runs: RunsInCells, laws: TwoLaws, title: str = "difference") -> CellMap:
     """The share of the second law minus that of the first."""
     table = runs.table[runs.table[laws.axis].isin(laws[1:])]
     title = f"{title}, {_short(laws.second)} minus {_short(laws.first)}"
-    cells = _cells(runs, differences_of(table, runs.by, laws), table, is_difference=True)
+    cells = _cells(runs, differences_of(table, runs.by, laws), table, table[:0], is_difference=True)
     return CellMap(title=title, is_difference=True, cells=tuple(cells))
 
 
 def _maps(
-    runs: RunsInCells, found: "pd.DataFrame", title: str, table: "pd.DataFrame", *, is_difference: bool = False
+    runs: RunsInCells,
+    found: "pd.DataFrame",
+    title: str,
+    table: "pd.DataFrame",
+    others: "pd.DataFrame",
+    *,
+    is_difference: bool = False,
 ) -> list[CellMap]:
-    """A map for each law of some cells, which open the runs in a table."""
-    groups = [("", found, table)]
+    """A map for each law of some cells, which open the runs in a table, and list the `others`."""
+    each, groups = (found, table, others), [("", found, table, others)]
     if runs.law is not None:
         laws = runs.table[runs.law].unique()
-        groups = [(f", {_short(str(law))}", *(each[each[runs.law] == law] for each in (found, table))) for law in laws]
+        groups = [(f", {_short(str(law))}", *(one[one[runs.law] == law] for one in each)) for law in laws]
     return [
         CellMap(
             title=title + end,
             is_difference=is_difference,
-            cells=tuple(_cells(runs, cells, opened, is_difference=is_difference)),
+            cells=tuple(_cells(runs, cells, opened, listed, is_difference=is_difference)),
         )
-        for end, cells, opened in groups
+        for end, cells, opened, listed in groups
     ]
 
 
-def _cells(runs: RunsInCells, found: "pd.DataFrame", table: "pd.DataFrame", *, is_difference: bool) -> list[MapCell]:
-    """Cells of shares, or of differences, of one law or two; a cell opens the runs in a table with its two values."""
+def _cells(
+    runs: RunsInCells, found: "pd.DataFrame", table: "pd.DataFrame", others: "pd.DataFrame", *, is_difference: bool
+) -> list[MapCell]:
+    """Cells of shares, or of differences, of one law or two.
+
+    A cell opens the runs in a table with its two values, and lists the others.
+    """
     by = [runs.across.name, runs.up.name]
-    opened = table.groupby(by)["design_index"].agg(list).to_dict()
+    opened, listed = (each.groupby(by)["design_index"].agg(list).to_dict() for each in (table, others))
     cells = []
     for row in found.to_dict("records"):
         key = tuple(row[name] for name in by)
         place = (float(runs.across.quantity.of(key[0])), _value(runs.up, key[1]))
         value, low, high = (row[name] for name in ("difference" if is_difference else "share", "low", "high"))
         counts = None if is_difference else (row["good"], row["count"], runs.word)
-        cells.append(_cell(place, (value, low, high), tuple(map(int, opened.get(key, ()))), counts))
+        own, of_other = (tuple(map(int, indices.get(key, ()))) for indices in (opened, listed))
+        cells.append(replace(_cell(place, (value, low, high), own, counts), others=of_other))
     return cells
 
 

@@ -97,8 +97,9 @@ function openRepeated(cell) {
   drawRepeated();
   byId("cell").hidden = false;
   byId("cell-title").textContent = placeOfRepeated(cell);
-  const ofFirst = report.repeated.maps.some((each) => each.cells.every(({ runs }) => !runs.length)) ? " of the first study, the only one whose runs are in this file" : "";
-  const hint = cell.runs.length ? `Each point is a run${ofFirst}; click one, or use the arrow keys, to open it.` : "This file does not have its runs; a report of that study alone does.";
+  const diamonds = cell.others.length ? ` Diamonds: runs of ${report.other.name}, which a report of that study alone opens.` : "";
+  const click = cell.runs.length ? `; click one${diamonds && ` of ${report.title}`}, or use the arrow keys, to open it` : "";
+  const hint = `Each point is a run${click}.${diamonds}`;
   byId("cell-text").textContent = `${cell.said}. ${hint}`;
   map.rows = cell.runs.map(rowOfIndex).filter((row) => row !== undefined);
   map.x = axes.findLast((axis) => ![report.repeated.across, report.repeated.up].includes(axis.name) && !axis.words) ?? axes.at(-1);
@@ -106,6 +107,27 @@ function openRepeated(cell) {
   measureSlider();
   byId("cell-controls").replaceChildren(choice("Metric", drawable.map((column) => [column.name, column.label]), map.metric.name, (name) => { map.metric = columnsByName.get(name); drawRunsOfCell(); }));
   drawRunsOfCell().then(() => openRow(firstOf(map.rows)));
+}
+
+/** The runs of the second study in the open cell, and those of the first by its name. */
+function besideOther(own) {
+  const { others } = cells.open;
+  if (!others?.length) return own;
+  const columns = new Map(report.other.table.columns.map((column) => [column.name, column]));
+  const at = (name, row) => (columns.has(name) ? cellOf(columns.get(name), row) : NaN);
+  const wanted = new Set(others);
+  const rows = [...Array(report.other.table.count).keys()].filter((row) => wanted.has(at("design_index", row)));
+  const values = rows.map((row) => at(map.metric.name, row));
+  const foot = [...heights(), ...values.filter(Number.isFinite)].reduce((least, value) => Math.min(least, value), Infinity);
+  const said = (i) => `<b>${escaped(report.other.name)}, run ${at("design_index", rows[i])}: ${escaped(at("outcome", rows[i]))}</b><br>${escaped(map.metric.label)}: ${withUnit(values[i], escaped(map.metric.unit ?? ""))}`;
+  const name = `${escaped(report.other.name)}: ${others.length} run${others.length > 1 ? "s" : ""}`;
+  return [
+    ...own.map((trace) => ({ ...trace, name: `${escaped(report.title)}: ${trace.name}` })),
+    {
+      type: "scatter", mode: "markers", name, said, x: rows.map((row) => at(map.x.name, row)), y: values.map((value) => (Number.isFinite(value) ? value : Number.isFinite(foot) ? foot : 0)),
+      marker: { symbol: "diamond-open", size: 9, color: COLORS[2], line: { width: 1.5, color: COLORS[2] } },
+    },
+  ];
 }
 
 /** The row of the table of a run by its index in the design. */

@@ -71,10 +71,12 @@ def test_two_studies_have_their_own_maps_and_the_difference_of_both_in_pairs_of_
     other = runs_with(chosen, lambda at: (at["timing.period"], at["timing.loss"]) != (0.02, 0.1) and at["seed"] != 3)
     found = maps_of_both(("a", one), ("b", other))
     assert found is not None
-    first, second, difference = found.maps
+    _, second, difference = found.maps
     assert [one.title for one in found.maps] == ["a: share settled", "b: share settled", "difference, b minus a"]
     assert cell(second, 20.0, 0.1).text == "0/3"
-    assert (cell(first, 20.0, 0.1).runs, cell(second, 20.0, 0.1).runs) == ((9, 10, 11), ())
+    assert [(of.runs, of.others) for of in (cell(each, 20.0, 0.1) for each in found.maps)] == [
+        ((9, 10, 11), ()), ((), (9, 10, 11)), ((9, 10, 11), (9, 10, 11)),
+    ]  # fmt: skip
     apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(2, 3))
     shares = [{"share": share, "low": low, "high": high} for share, (low, high) in zip((0.0, 2 / 3), ends)]
     assert (apart.low, apart.high) == interval_of_difference(*shares)
