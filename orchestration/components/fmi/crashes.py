@@ -1,4 +1,7 @@
-"""Where the C of an FMU crashes: its line and function, found by the process just before it ends (Linux, glibc)."""
+"""Where the C of an FMU crashes, or is when its time is over: line and function, found by the ending process.
+
+On Linux with glibc.
+"""
 
 import contextlib
 import ctypes
@@ -8,7 +11,8 @@ import subprocess
 from collections.abc import Callable
 from typing import Any
 
-_SIGNALS = ("SIGSEGV", "SIGFPE", "SIGILL", "SIGTRAP")
+_SIGNALS = ("SIGSEGV", "SIGFPE", "SIGILL", "SIGTRAP", "SIGPROF")
+"""The last one is sent to a process that is out of time, as `limit_enforcement` does"""
 _OF_CHECKS = " (index, overflow, division, shift or conversion that C leaves undefined)"
 """Checks that may have failed where code with checks ends itself: the signal does not tell which"""
 _MEANING = {"SIGFPE": " (integer division by zero)", "SIGILL": _OF_CHECKS, "SIGTRAP": _OF_CHECKS}
@@ -52,7 +56,9 @@ class _Symbol(ctypes.Structure):
 
 
 def report_crashes(report: Callable[[str], None]) -> None:
-    """Pass the line in an FMU to `report`, if it is known, when its C crashes; then the process ends as without this.
+    """Pass the line in an FMU to `report`, if it is known, when its C crashes or its time is over.
+
+    The process ends as without this.
 
     A handler in Python is not called in time, therefore this is one of C, which ctypes makes of a function.
     """

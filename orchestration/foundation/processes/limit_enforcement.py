@@ -1,7 +1,10 @@
 """Ends a process and its descendants when it exceeds a limit."""
 
+import contextlib
 import math
 import os
+import signal
+import sys
 import threading
 import time
 from collections.abc import Mapping
@@ -45,6 +48,8 @@ _POLL = 0.05
 """Time between two checks [s], unless the time limit is short or checking is slow"""
 _SHARE = 0.1
 """Largest share of the time limit between two checks"""
+_PATIENCE = 2.0
+"""Time in which a process that is out of time may tell where it is [s]"""
 _EFFORT = 0.05
 """Largest share of a processor used for checking"""
 
@@ -127,9 +132,20 @@ class Watch:
                 if self._process.poll() is None:
                     self.reached = self._exceeded(sum(each.memory for each in members.values()))
                 if self.reached is not None or self._process.poll() is not None:
+                    if self.out_of_time:
+                        self._ask_for_place()
                     self._family.kill(self._process)  # also after it has ended: others may hold its pipes open
                     return
             pause = self._pause(time.monotonic() - now)
+
+    def _ask_for_place(self) -> None:
+        """Have the process tell where it is, if it can (`report_crashes`), and end by that."""
+        if sys.platform == "linux":
+            with contextlib.suppress(OSError):
+                self._process.send_signal(signal.SIGPROF)
+            until = time.monotonic() + _PATIENCE
+            while self._process.poll() is None and time.monotonic() < until:
+                time.sleep(0.01)
 
     def _pause(self, cost: float) -> float:
         return max(min(_POLL, _SHARE * self._time), cost / _EFFORT)

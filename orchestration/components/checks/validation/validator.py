@@ -47,6 +47,7 @@ def _of_ending(received: ReceivedReport, ending: Ending, silent: float | None, l
 
     `silent`: seconds of the process's time since a call of the FMU began or returned; None if there was none.
     """
+    place = f", at {received.place}" if received.place else ""
     moment = "after the last rule" if received.ended else f"in {received.rule or 'reading'}"
     if received.reached is not None and not received.ended:
         moment = f"{moment}, after t = {received.reached:g} s"
@@ -55,9 +56,8 @@ def _of_ending(received: ReceivedReport, ending: Ending, silent: float | None, l
         why = ""
         if ending.out_of_time and silent is not None:
             why = "a call does not return" if hangs else "its calls return, it is slow"
-        text = "; ".join(filter(None, (f"stopped {moment}: {ending.reached}", why, "the rest was not checked")))
+        text = "; ".join(filter(None, (f"stopped {moment}{place}: {ending.reached}", why, "the rest was not checked")))
         return [Finding(PROCESS, text)]
     if ending.code == 0 and received.ended:
         return []
-    place = f", at {received.place}" if received.place else ""
     return [Finding(PROCESS, f"the process of the FMU {ending.description} {moment}{place}")]

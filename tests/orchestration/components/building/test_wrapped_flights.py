@@ -327,6 +327,10 @@ def test_a_crash_in_the_c_is_one_line_with_its_signal_and_its_place(integrator: 
             "SIGILL",
             "bad.toml:9 (index, overflow, division, shift or conversion that C leaves undefined)",
         ),
+        "static volatile int k; if (n++ == 3) for (;;) k = !k;": (
+            "it takes more than the time limit of 1 s",
+            "bad.toml:8",
+        ),
     }
     ways = "".join(f"if (pd_kp == {k}) {{ {change} }} " for k, change in enumerate(changes, 2))  # all in one FMU
     text = file.read_text().replace(step, f"static int n; {ways}{step}").replace('"pd.c"', '"pd.c", "bad.c"')
@@ -335,7 +339,8 @@ def test_a_crash_in_the_c_is_one_line_with_its_signal_and_its_place(integrator: 
         file.with_name("bad.toml").write_text(text.replace('"Pd"', checked))
         system = integrator.with_name("bad_system.toml")
         system.write_text(integrator.read_text().replace("pd.toml", "bad.toml"))
-        done = main("run", system, "--build", "--set", f"components.controller.parameters.k_p={k}", code=1)
+        limited = ("--time-limit", "1") if "time limit" in died else ()
+        done = main("run", system, "--build", "--set", f"components.controller.parameters.k_p={k}", *limited, code=1)
         (line,) = [line for line in done.stderr.splitlines() if line.startswith("quadcosim:")]
         assert f"{died}, in a call of controller (Bad), at {place}, after t = " in line
     overrun = "static int n; static struct { int of[3]; } all; all.of[n++] = 1;"
