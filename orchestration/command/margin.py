@@ -38,6 +38,10 @@ def margin(
     and_of: Annotated[
         str | None, option("--and", "With --of: a second quantity that varies; draws a region.", "PATH")
     ] = None,
+    to: Annotated[
+        float | None,
+        option("--to", "With --of: the end of the range. Default: 8 losses, or what a draw may last.", "B"),
+    ] = None,
     check: Annotated[
         Path | None, option("--check", "Verify a certificate, and with a file that it belongs to that loop.", "FILE")
     ] = None,
@@ -48,8 +52,11 @@ def margin(
     flags: FlightFlags,
 ) -> CommandResult:
     """Find how late, and how irregular, messages and samples may be with the linear loop provably stable."""
-    if of is None and (and_of is not None or (check is None and out is not None)):
-        raise UsageError(f"{'--out' if and_of is None else '--and'}: expected --of PATH beside it")
+    if of is None and (and_of is not None or to is not None or (check is None and out is not None)):
+        flag = "--and" if and_of is not None else "--to" if to is not None else "--out"
+        raise UsageError(f"{flag}: expected --of PATH beside it")
+    if and_of is not None and to is not None:
+        raise UsageError("--to: expected no --and beside it")
     if check is not None:
         if of is not None or out is not None:
             raise UsageError("--check: expected neither --of nor --out; the certificate has what varies")
@@ -58,13 +65,13 @@ def margin(
     request = request_from(scenario, flags, timing)
     if of is None:
         return _of_hover(request)
-    return _certified(request, of, out) if and_of is None else _region(request, of, and_of, out)
+    return _certified(request, of, to, out) if and_of is None else _region(request, of, and_of, out)
 
 
-def _certified(request: "Request", of: str, out: Path | None) -> CommandResult:
+def _certified(request: "Request", of: str, to: float | None, out: Path | None) -> CommandResult:
     from orchestration.theory.certificates.margin import margin as certify
 
-    found = certify(request, of, progress="bar")
+    found = certify(request, of, to=to, progress="bar")
     written = None if out is None or found.certificate is None else found.save(out)
     document = dataclasses.asdict(found) | {"certificate": written}
     unit = "" if of.endswith("loss") else " s"

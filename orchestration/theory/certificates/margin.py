@@ -34,8 +34,10 @@ from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import at_rest
 
-MOST_LOST = 8
-"""losses in a row that are considered"""
+MOST_LOST, MOST_LOST_GIVEN = 8, 16
+"""Losses in a row that are considered, and that may be requested: sequences double with each"""
+MOST_STATES = 40
+"""states that act on one another for which a proof is sought"""
 SHARES = (0.95, 0.97, 0.98, 0.99, 1.0)
 """Shares of the breaking or the largest value: tried for a certificate, upward; below the first by bisection"""
 FINEST = 0.02
@@ -59,6 +61,10 @@ class Certified:
     """The small-gain bound of Kao and Lincoln; None where it does not apply."""
     largest: float
     """The largest value that was considered."""
+    beyond: str = ""
+    """Why it is the largest; empty: a value of `to`."""
+    not_sought: str = ""
+    """Why no proof was sought; empty: one was."""
     searched: str
     """Sequences that were tried for `breaking`, as text."""
     states: int
@@ -77,10 +83,11 @@ class Certified:
 
         if self.breaking == 0.0:
             return f"unstable even without variation of {self.of}"
-        proved = (
-            "no proof found" if self.certified is None else f"every sequence up to {shown(self.certified)} is stable"
-        )
-        broken = f"none found up to {shown(self.largest)}, the most that is tried, that breaks the loop"
+        proved = f"no proof sought: {self.not_sought}" if self.not_sought else "no proof found"
+        if self.certified is not None:
+            proved = f"every sequence up to {shown(self.certified)} is stable"
+        beyond = f" ({self.beyond})" if self.beyond else ""
+        broken = f"none found up to {shown(self.largest)}, the most that is tried{beyond}, that breaks the loop"
         if self.breaking is not None:
             broken = f"one of {shown(self.breaking)} breaks the loop"
         best = ""
@@ -102,27 +109,39 @@ class Certified:
 
 
 @needs("flint", "clarabel")
-def margin(request: RequestLike, of: str, *, progress: ShareProgress = None) -> Certified:
+def margin(request: RequestLike, of: str, *, to: float | None = None, progress: ShareProgress = None) -> Certified:
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
     which means the longest run of messages lost in a row; all else is without jitter. Of a system with computers or
     networks it is that of a task's `execution`, or of the `jitter` of a task or message; the others vary as the file
-    allows. The result is about the linear loop, not about large errors.
+    allows. Values up to `to` are considered; by default 8 losses, and times as long as no two draws are open at once.
+    The result is about the linear loop, not about large errors.
 
     Raises `UsageError` where the loop has no linear form or the path is unsupported, saying why.
     """
     request = request_of(request)
     cause = cause_in(request, of)
     if cause is not None:
+        if to is not None:
+            raise UsageError(
+                f"--to {to:g}: expected none for {of}, of which all values that have a proof are considered"
+            )
         with share_reporter(progress, "certifying") as report:
             return _of_cause(request, cause, report)
     varying = varying_of(request, of)
     expect_without_scheduler(request)
+    most = MOST_LOST if to is None else to
+    if varying.kind == LOSS and most not in range(1, MOST_LOST_GIVEN + 1):
+        raise UsageError(f"--to {most:g}: expected a number of losses in a row, from 1 to {MOST_LOST_GIVEN}")
     loop = linear_loop_of(request)
     timeline = LoopTimeline(loop, [varying])
     with share_reporter(progress, "certifying") as report:
-        found = (_of_losses if varying.kind == LOSS else _of_times)(timeline, varying, report)
+        if varying.kind == LOSS:
+            beyond = "--to tries more" if to is None else ""
+            found = replace(_of_losses(timeline, varying, int(most), report), beyond=beyond)
+        else:
+            found = _of_times(timeline, varying, to, report)
     return replace(found, in_double=are_in_double(loop.system.components))
 
 
@@ -176,11 +195,33 @@ def varying_of(request: Request, of: str) -> Varying:
     )
 
 
-def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
+def not_sought_for(family: LoopFamily) -> str:
+    """Why no proof is sought for a loop that is too large; empty for others."""
+    from orchestration.theory.certificates.find_certificate import parts_of
+
+    largest = max(map(len, parts_of(family)))
+    return (
+        "" if largest <= MOST_STATES
+        else f"{largest} states act on one another, messages on their way included, of at most {MOST_STATES}"
+    )  # fmt: skip
+
+
+def _of_times(timeline: LoopTimeline, varying: Varying, to: float | None, progress: Share) -> Certified:
+    tried = 0
+
     def up_to(value: float) -> LoopFamily:
+        nonlocal tried
+        tried += 1
+        progress(0.5 * (1.0 - 0.95**tried))
         return timeline.family([value])
 
-    largest = floor_to_nanoseconds(timeline.largest())
+    possible = floor_to_nanoseconds(timeline.largest())
+    largest = possible if to is None else floor_to_nanoseconds(to)
+    if to is not None and not 0.0 < to <= possible:
+        raise UsageError(
+            f"--to {to:g}: expected above 0, and at most {possible:g} s; beyond, two draws would be open at once"
+        )
+    beyond = "beyond, two draws would be open at once" if largest == possible else ""
     searched = (
         f"draws at either end of each range, sequences that repeat after at most {LONGEST_SEQUENCE}, "
         f"values up to {largest:g} s"
@@ -190,44 +231,47 @@ def _of_times(timeline: LoopTimeline, varying: Varying, progress: Share) -> Cert
         return Certified(of=varying.path, breaking=0, largest=largest, searched=searched, states=states)
     broken = least_breaking(up_to, largest)
     top = largest if broken is None else broken.value
-    value, certificate = largest_certified(up_to, [varying.path], top, progress)
+    value, certificate, not_sought = None, None, not_sought_for(up_to(top))
+    if not not_sought:
+        value, certificate = largest_certified(lambda value: timeline.family([value]), [varying.path], top, progress)
     return Certified(
-        of=varying.path, certified=value, breaking=None if broken is None else broken.value,
+        of=varying.path, certified=value, beyond=beyond, not_sought=not_sought,
+        breaking=None if broken is None else broken.value,
         breaking_sequence=() if broken is None else broken.sequence,
         small_gain=small_gain(timeline.loop, varying), largest=largest, searched=searched,
         states=len(up_to(top).kept), certificate=certificate,
     )  # fmt: skip
 
 
-def _of_losses(timeline: LoopTimeline, varying: Varying, progress: Share) -> Certified:
+def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Share) -> Certified:
     from orchestration.theory.certificates.find_certificate import find_certificate
 
-    searched = (
-        f"sequences that repeat after at most the run and {LONGEST_SEQUENCE // 2} messages, runs up to {MOST_LOST}"
-    )
+    searched = f"sequences that repeat after at most the run and {LONGEST_SEQUENCE // 2} messages, runs up to {most}"
     if breaking_at(timeline.family(), 0.0) is not None:
         states = len(timeline.family().kept)
-        return Certified(of=varying.path, breaking=0, largest=MOST_LOST, searched=searched, states=states)
+        return Certified(of=varying.path, breaking=0, largest=most, searched=searched, states=states)
     broken: BreakingSequence | None = None
     families = list[LoopFamily]()
-    for run in range(MOST_LOST + 1):
-        progress(0.5 * run / (MOST_LOST + 1))
+    for run in range(most + 1):
+        progress(0.5 * run / (most + 1))
         family = timeline.family(run=run)
         broken = breaking_at(family, run, run + LONGEST_SEQUENCE // 2)
         if broken is not None:
             break
         families.append(family)
-    value, certificate = None, None
-    for run, family in reversed([*enumerate(families)]):  # a proof for a run is one for all shorter ones
-        progress(1.0 - 0.5 * (run + 1) / (MOST_LOST + 1))
+    value, certificate, not_sought = None, None, not_sought_for(timeline.family(run=most))
+    for run, family in reversed(
+        [] if not_sought else [*enumerate(families)]
+    ):  # a proof for a run is one for all shorter ones
+        progress(1.0 - 0.5 * (run + 1) / (most + 1))
         found = find_certificate(family, [varying.path])
         if found is not None:
             value, certificate = run, found.certificate.to_json()
             break
     return Certified(
         of=varying.path, certified=value, breaking=None if broken is None else broken.value,
-        breaking_sequence=() if broken is None else broken.sequence, largest=MOST_LOST,
-        searched=searched, states=len(timeline.family(run=MOST_LOST).kept), certificate=certificate,
+        breaking_sequence=() if broken is None else broken.sequence, largest=most,
+        searched=searched, states=len(timeline.family(run=most).kept), certificate=certificate, not_sought=not_sought,
     )  # fmt: skip
 
 
@@ -239,13 +283,13 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
         search = isolated_call(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
     largest = scheduled.largest()
     top = largest if search.breaking is None else min(largest, search.breaking)
-    value, certificate = None, None
-    if search.breaking != 0.0:
+    value, certificate, not_sought = None, None, not_sought_for(scheduled.family(0.0))
+    if search.breaking != 0.0 and not not_sought:
         value, certificate = largest_certified(scheduled.family, [cause.path], top, progress)
     return Certified(
         of=cause.path, certified=value, breaking=search.breaking,
         breaking_sequence=search.sequence, largest=largest, searched=search.searched,
-        states=len(scheduled.family(0.0).kept), certificate=certificate,
+        states=len(scheduled.family(0.0).kept), certificate=certificate, not_sought=not_sought,
         in_double=are_in_double(loop.system.components),
     )  # fmt: skip
 
@@ -267,7 +311,7 @@ def largest_certified(
     def works(share: float) -> bool:
         nonlocal best, step, attempts
         attempts += 1
-        progress(1.0 - 0.7**attempts)
+        progress(1.0 - 0.5 * 0.7**attempts)
         value = floor_to_nanoseconds(share * top)
         found = find_certificate(family_up_to(value), of, step)
         if found is not None:

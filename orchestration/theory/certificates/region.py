@@ -106,6 +106,8 @@ def margin_region(
     timeline = LoopTimeline(margin.linear_loop_of(request), pair)
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")
+    if too_large := margin.not_sought_for(timeline.family([0.0, 0.0])):
+        raise UsageError(f"no proof is sought: {too_large}")
     paths = (pair[0].path, pair[1].path)
     with share_reporter(progress, "certifying") as report:
         widest = _least_breaking(timeline, 0.0, first=True)
