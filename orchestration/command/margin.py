@@ -71,7 +71,7 @@ def margin(
 def _certified(request: "Request", of: str, to: float | None, out: Path | None) -> CommandResult:
     from orchestration.theory.certificates.margin import margin as certify
 
-    found = certify(request, of, to=to, progress="bar")
+    found = certify(request, of, last=to, progress="bar")
     written = None if out is None or found.certificate is None else found.save(out)
     document = dataclasses.asdict(found) | {"certificate": written}
     unit = "" if of.endswith("loss") else " s"

@@ -62,7 +62,7 @@ class Certified:
     largest: float
     """The largest value that was considered."""
     beyond: str = ""
-    """Why it is the largest; empty: a value of `to`."""
+    """Why it is the largest; empty: it is `last`."""
     not_sought: str = ""
     """Why no proof was sought; empty: one was."""
     searched: str
@@ -109,13 +109,13 @@ class Certified:
 
 
 @needs("flint", "clarabel")
-def margin(request: RequestLike, of: str, *, to: float | None = None, progress: ShareProgress = None) -> Certified:
+def margin(request: RequestLike, of: str, *, last: float | None = None, progress: ShareProgress = None) -> Certified:
     """How far a quantity of a system may vary from draw to draw, the loop linearised about its operating point.
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
     which means the longest run of messages lost in a row; all else is without jitter. Of a system with computers or
     networks it is that of a task's `execution`, or of the `jitter` of a task or message; the others vary as the file
-    allows. Values up to `to` are considered; by default 8 losses, and times as long as no two draws are open at once.
+    allows. Values up to `last` are considered; by default 8 losses, and times as long as no two draws are open at once.
     The result is about the linear loop, not about large errors.
 
     Raises `UsageError` where the loop has no linear form or the path is unsupported, saying why.
@@ -123,25 +123,25 @@ def margin(request: RequestLike, of: str, *, to: float | None = None, progress: 
     request = request_of(request)
     cause = cause_in(request, of)
     if cause is not None:
-        if to is not None:
+        if last is not None:
             raise UsageError(
-                f"--to {to:g}: expected none for {of}, of which all values that have a proof are considered"
+                f"--to {last:g}: expected none for {of}, of which all values that have a proof are considered"
             )
         with share_reporter(progress, "certifying") as report:
             return _of_cause(request, cause, report)
     varying = varying_of(request, of)
     expect_without_scheduler(request)
-    most = MOST_LOST if to is None else to
+    most = MOST_LOST if last is None else last
     if varying.kind == LOSS and most not in range(1, MOST_LOST_GIVEN + 1):
         raise UsageError(f"--to {most:g}: expected a number of losses in a row, from 1 to {MOST_LOST_GIVEN}")
     loop = linear_loop_of(request)
     timeline = LoopTimeline(loop, [varying])
     with share_reporter(progress, "certifying") as report:
         if varying.kind == LOSS:
-            beyond = "--to tries more" if to is None else ""
+            beyond = "--to tries more" if last is None else ""
             found = replace(_of_losses(timeline, varying, int(most), report), beyond=beyond)
         else:
-            found = _of_times(timeline, varying, to, report)
+            found = _of_times(timeline, varying, last, report)
     return replace(found, in_double=are_in_double(loop.system.components))
 
 
@@ -206,7 +206,7 @@ def not_sought_for(family: LoopFamily) -> str:
     )  # fmt: skip
 
 
-def _of_times(timeline: LoopTimeline, varying: Varying, to: float | None, progress: Share) -> Certified:
+def _of_times(timeline: LoopTimeline, varying: Varying, last: float | None, progress: Share) -> Certified:
     tried = 0
 
     def up_to(value: float) -> LoopFamily:
@@ -216,10 +216,10 @@ def _of_times(timeline: LoopTimeline, varying: Varying, to: float | None, progre
         return timeline.family([value])
 
     possible = floor_to_nanoseconds(timeline.largest())
-    largest = possible if to is None else floor_to_nanoseconds(to)
-    if to is not None and not 0.0 < to <= possible:
+    largest = possible if last is None else floor_to_nanoseconds(last)
+    if last is not None and not 0.0 < last <= possible:
         raise UsageError(
-            f"--to {to:g}: expected above 0, and at most {possible:g} s; beyond, two draws would be open at once"
+            f"--to {last:g}: expected above 0, and at most {possible:g} s; beyond, two draws would be open at once"
         )
     beyond = "beyond, two draws would be open at once" if largest == possible else ""
     searched = (

@@ -101,22 +101,24 @@ def test_a_valid_proof_of_altered_matrices_is_refused_against_the_system(
 
 def test_a_range_ends_where_it_is_told_to(system: System) -> None:
     brisk = changed(system, {"components.controller.sampling.period": 0.2})
-    assert "up to 1 in a row, the most that is tried, that breaks the loop" in margin(brisk, LOST, to=1).verdict
-    with pytest.raises(UsageError, match="--to 17: expected a number of losses in a row, from 1 to 16"):
-        margin(brisk, LOST, to=17)
-    with pytest.raises(UsageError, match="--to 2: expected above 0, and at most 1 s; beyond, two draws would be open"):
-        margin(system, COMMAND, to=2)
+    assert "up to 1 in a row, the most that is tried, that breaks the loop" in margin(brisk, LOST, last=1).verdict
+    with pytest.raises(UsageError, match="last = 17: expected a number of losses in a row, from 1 to 16"):
+        margin(brisk, LOST, last=17)
+    with pytest.raises(
+        UsageError, match="last = 2: expected above 0, and at most 1 s; beyond, two draws would be open"
+    ):
+        margin(system, COMMAND, last=2)
 
 
 def test_of_a_loop_too_large_for_a_proof_only_what_breaks_it_is_sought(
     system: System, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(certificates, "MOST_STATES", 2)
-    found = margin(system, LOST, to=3)
+    monkeypatch.setattr(certificates, "MOST_STATES", 1)
+    found = margin(system, LOST, last=3)
     assert found.certified is None
     assert found.breaking == 1
     assert "no proof sought: 3 states act on one another" in found.verdict
-    with pytest.raises(UsageError, match="no proof is sought: 3 states"):
+    with pytest.raises(UsageError, match="no proof is sought: 2 states"):
         margin_region(system, COMMAND, SAMPLE)
 
 
