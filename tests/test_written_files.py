@@ -19,6 +19,7 @@ WRITERS = {
     *("json.dump", "pickle.dump", "tomli_w.dump"),
 }
 """Names of functions that write, move or make files, with their module where the name alone is ambiguous"""
+LAST = {name.rpartition(".")[2] for name in WRITERS} | {"open", "ZipFile", "replace"}
 
 _INTEROP = "orchestration/simulation/interop"
 _RUNS = "orchestration/simulation/runs"
@@ -66,8 +67,10 @@ def calls(tree: ast.AST, staged: frozenset[str] = frozenset()) -> Iterator[tuple
 
 def writer_of(call: ast.Call) -> str | None:
     """The name of the function if the call writes, moves or makes a file."""
+    last = getattr(call.func, "attr", getattr(call.func, "id", ""))
+    if last not in LAST:
+        return None
     name = ast.unparse(call.func)
-    last = name.rpartition(".")[2]
     texts = [
         each.value for each in [*call.args, *(one.value for one in call.keywords)] if isinstance(each, ast.Constant)
     ]
