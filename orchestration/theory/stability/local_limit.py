@@ -5,11 +5,11 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from itertools import groupby
 
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.bisection import Bracket, Range, ends_of_good
+from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.unit_algebra import some
 from orchestration.simulation.requests.ranges import Varied
@@ -28,10 +28,11 @@ from orchestration.theory.stability.operating_point import (
 )
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
+from orchestration.theory.stability.sign_changes import short, zero_between
 
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
-LOOP_TOLERANCE, TWINS_TOLERANCE = 0.01, 0.2
-"""Tolerances as shares of the tolerance of the measured limit"""
+LOOP_ZERO, TWINS_TOLERANCE = 1e-6, 0.2
+"""Growth that counts as 0, as a share of that beyond the limit; tolerance as a share of that of the measured limit"""
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
 OTHER_PULSE = 0.25
 """factor of the second pulse, whose growth is compared"""
@@ -107,7 +108,7 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         return found
 
     rates = _commensurate(at, span)
-    found = _first_growth(growth, span, LOOP_TOLERANCE, LOOP) if rates is None else _first_tried(growth, span, rates)
+    found = _first_growth(growth, span, LOOP, None) if rates is None else _first_tried(growth, span, rates)
     code = of_code(are_in_double({name: one for name, (one, _, _) in known.items()}))
     found = replace(found, method=f"{LOOP}{code}")
     if found.limit is None or found.accuracy is None:
@@ -125,7 +126,7 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
     """
     with closing(Instances()) as instances:
         known = _known_at_own(at, span, instances)
-        found = _first_growth(partial(_rate, at, instances, known, 1.0), span, TWINS_TOLERANCE, TWINS)
+        found = _first_growth(partial(_rate, at, instances, known, 1.0), span, TWINS, TWINS_TOLERANCE)
         if found.limit is None:
             return found
         near = _near(found.limit, span)
@@ -209,6 +210,15 @@ def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimi
     return LinearLimit(limit=limit, lower=_middle(lower), method=LOOP, accuracy=accuracy, reason=reason)
 
 
+def _by_secants(growth: Growth, span: Range, bracket: Bracket | None) -> Bracket | None:
+    """The bracket narrowed to where growth is 0, or jumps."""
+    if bracket is None or bracket.good is None:
+        return bracket
+    low, high = sorted((value, growth(value)) for value in bracket if value is not None)
+    zero = LOOP_ZERO * growth(bracket.bad)
+    return Bracket(*zero_between(growth, lambda value: short(value, span.unit), low, high, zero))
+
+
 def _middle(bracket: Bracket | None) -> float | None:
     return None if bracket is None or bracket.good is None else 0.5 * (bracket.good + bracket.bad)
 
@@ -227,11 +237,14 @@ def _narrowed(growth: Growth, bracket: Bracket, fine: list[float]) -> Bracket:
     return Bracket(good, bad)
 
 
-def _first_growth(growth: Growth, span: Range, finer: float, method: str) -> LinearLimit:
-    """The values between which small deviations decay, by a scan and bisection."""
-    width, values = span.tolerance * finer, span.values()
+def _first_growth(growth: Growth, span: Range, method: str, finer: float | None) -> LinearLimit:
+    """The values between which small deviations decay, by a scan and bisection; without `finer` by secants."""
+    values, growth = span.values(), cache(growth)
+    width = span.tolerance * (1.0 if finer is None else finer)
     ends = ends_of_good(lambda value: growth(value) > 0.0, values, span.own, width)
-    lower, upper = (None if end is None or end.good is None else 0.5 * (end.good + end.bad) for end in ends)
+    if finer is None:
+        ends, width = Ends(*(_by_secants(growth, span, end) for end in ends)), LOOP_ZERO * width
+    lower, upper = map(_middle, ends)
     reason = ""
     if ends.upper is None:
         start, end = span.text(values[0] if lower is None else lower), span.text(values[-1])

@@ -38,7 +38,7 @@ from orchestration.theory.stability.operating_point import (
 )
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Complexes, poles_of
-from orchestration.theory.stability.sign_changes import zero_between
+from orchestration.theory.stability.sign_changes import short, zero_between
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.style import Figures
@@ -157,7 +157,7 @@ def locus(
     span = search_range(
         varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
     )
-    values = [_short(float(value), span.unit) for value in np.linspace(span.values()[0], span.last, count)]
+    values = [short(float(value), span.unit) for value in np.linspace(span.values()[0], span.last, count)]
     return isolated_call(files.fmus.values(), _root_locus, varied, values, span.unit)
 
 
@@ -194,7 +194,7 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
             return radius_of(value)
 
-        short, tried = _shortening(beside, unit), _beside_jumps(varied, system, values)
+        shortened, tried = _shortening(beside, unit), _beside_jumps(varied, system, values)
         crossings = list[Crossing]()
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
@@ -204,7 +204,7 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 report(1.0 - place / len(tried))
                 if (high < 1.0) != (above < 1.0):
                     ends = ((tried[place], high - 1.0), (tried[place + 1], above - 1.0))
-                    inside, outside = zero_between(lambda value: radius(value) - 1.0, short, *ends)
+                    inside, outside = zero_between(lambda value: radius(value) - 1.0, shortened, *ends)
                     crossings.insert(0, _crossing(inside, outside, *found[outside], leaves=high < 1.0))
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
@@ -221,11 +221,11 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
 def _shortening(beside: tuple[list[Fraction], float] | None, unit: str | None) -> Callable[[float], float]:
     """The function to the nearest value that is tried: of a period `beside` others one at which they coincide."""
     if beside is None:
-        return lambda value: _short(value, unit)
+        return lambda value: short(value, unit)
     whole = hyperperiod(beside[0])
     fractions = (whole / count for count in range(LONGEST_HYPERPERIOD, 0, -1))
     step = float(next(one for one in fractions if one.denominator == 1)) * beside[1]
-    return lambda value: _short(step * round(value / step), unit)
+    return lambda value: short(step * round(value / step), unit)
 
 
 def _beside_jumps(varied: Varied, system: System, values: list[float]) -> list[float]:
@@ -261,11 +261,6 @@ def _incommensurate(varied: Varied, system: System, values: list[float], repeats
         if 2 <= count <= len(values) and all(repeats(round(k * step, 9)) for k in range(first, last + 1)):
             return f"{text}, as --from {first * step:g} --to {last * step:g} --count {count}"
     return text
-
-
-def _short(value: float, unit: str | None) -> float:
-    """A value with few digits; a time in whole nanoseconds."""
-    return round(value, 9) if unit == "s" else float(f"{value:.9g}")
 
 
 def _crossing(value: float, until: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:

@@ -25,6 +25,11 @@ def roots(of: Callable[[Floats], Floats], low: Floats, high: Floats) -> Floats:
     return 0.5 * (low + high)
 
 
+def short(value: float, unit: str | None) -> float:
+    """A value with few digits; a time in whole nanoseconds."""
+    return round(value, 9) if unit == "s" else float(f"{value:.9g}")
+
+
 def zero_between(
     of: Callable[[float], float],
     short: Callable[[float], float],
