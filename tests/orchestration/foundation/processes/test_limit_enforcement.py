@@ -39,7 +39,7 @@ def busy(monkeypatch: pytest.MonkeyPatch) -> Busy:
 
 
 def watch(busy: Busy, limits: Limits) -> Watch:
-    process = cast("subprocess.Popen[bytes]", SimpleNamespace(poll=lambda: None))
+    process = cast("subprocess.Popen[bytes]", SimpleNamespace(poll=lambda: None, send_signal=lambda number: None))
     return Watch(process, cast(Family, busy), limits, None)
 
 
