@@ -1,6 +1,6 @@
 """The initial state of a system, as deviations from rest."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,19 +10,21 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import exact_nanoseconds
-from orchestration.simulation.engines.master import Master
 from orchestration.simulation.engines.resolved import never_computed
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import AFTER, System
 from orchestration.systems.system.paths import at_operating_point, changed, parameter_name
+from orchestration.theory.exact.objectives import Mean
 from orchestration.theory.stability.linearised_component import LINEAR, Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest, tracing_loader
 from orchestration.theory.stability.matrices import Components
-from orchestration.theory.stability.operating_point import deterministic, exchanged_signals, time_to_rest
+from orchestration.theory.stability.operating_point import deterministic, time_to_rest
 
 SMALLER = 0.1
 """Factor of a deviation from one in which coordinates are measured to the next"""
+SHARES = 10
+"""Smaller deviations from which coordinates are measured, at most"""
 EXACT = 1e-9
 """Error of coordinates, relative, up to which no smaller deviation is tried"""
 TOLERATED = 0.01
@@ -50,12 +52,17 @@ class InitialState:
 
 
 def initial_state_of(
-    system: System, loop: AtRest, parts: Components, tangents: Mapping[str, Tangent], instances: Instances
+    system: System,
+    loop: AtRest,
+    parts: Components,
+    tangents: Mapping[str, Tangent],
+    means: Collection[Mean],
+    instances: Instances,
 ) -> InitialState:
     """The initial state of `system`, in the coordinates of the components `parts` of its loop at rest.
 
-    Runs from it and from half of it, to the `stop_time`, show how linear the loop is. Raises `UsageError` where that
-    is too little, naming the share of the deviation from which it is linear enough.
+    Runs from it and from half of it, to the `stop_time`, show how nearly the `means` are those of a linear loop. Raises
+    `UsageError` where that is too little, naming the share of the deviation from which it is enough.
     """
     if time_to_rest(system):
         raise UsageError(
@@ -72,20 +79,22 @@ def initial_state_of(
     found, worst = _measured(prompt_system, loop, parts, tangents, instances)
     if not deviations:  # it rests there, as nearly as it comes to rest
         found = replace(found, accuracy=0.0)
-    factor = SMALLER
-    while found.accuracy > EXACT:
-        start = _scaled(prompt_system, deviations, factor)
-        smaller, name = _measured(start, loop, parts, tangents, instances, factor)
-        if smaller.accuracy >= found.accuracy:
+    factor = 1.0
+    for _ in range(SHARES if deviations else 0):
+        if found.accuracy <= EXACT:
             break
-        found, worst, factor = smaller, name, SMALLER * factor
+        factor *= SMALLER
+        smaller, name = _measured(_scaled(prompt_system, deviations, factor), loop, parts, tangents, instances, factor)
+        if smaller.accuracy < found.accuracy:
+            found, worst = smaller, name
+        elif found.accuracy <= LINEAR:
+            break
     if not found.accuracy <= LINEAR:
         raise UsageError(
-            f"{worst}: its initial state is not linear about its operating point: expected initial values near it that "
-            "its inputs could reach"
+            f"{worst}: its initial state, and any small share of it, is one that its inputs do not reach about its "
+            f"operating point: what they show misses {found.accuracy:.1g} of it; expected other initial values"
         )
-    # A share of a deviation that is not linear is off by at least half as much less, and a square by twice as much.
-    nonlinear = 4.0 * _nonlinearity(calm, deviations, loop, instances) if deviations else 0.0
+    nonlinear = 2.0 * _nonlinearity(calm, deviations, loop, means, instances) if deviations else 0.0
     return replace(found, accuracy=2.0 * found.accuracy + nonlinear)
 
 
@@ -150,18 +159,26 @@ def _scaled(system: System, deviations: Mapping[str, tuple[float, float]], facto
 
 
 def _nonlinearity(
-    calm: System, deviations: Mapping[str, tuple[float, float]], loop: AtRest, instances: Instances
+    calm: System,
+    deviations: Mapping[str, tuple[float, float]],
+    loop: AtRest,
+    means: Collection[Mean],
+    instances: Instances,
 ) -> float:
-    """By how much signals that start from all of the deviation are not twice those from half of it, relative."""
-    rest = np.array(_exchanged(loop.simulation.master, calm))
+    """By how much the means from all of the deviation differ from those of twice the motion from half of it, relative.
+
+    From a share of a deviation a mean is off by at least half as much less: the whole error is at most twice this.
+    """
+    signals = tuple(dict.fromkeys(signal for mean in means for signal in mean.signals))
+    rest = _values(loop.simulation.instances, signals)
     weight = ROUNDED * np.maximum(1.0, np.abs(rest))
-    whole = _flown(calm, loop, instances) - rest
+    whole = _flown(calm, signals, loop, instances) - rest
     for halving in range(HALVINGS):
-        half = _flown(_scaled(calm, deviations, 0.5 ** (halving + 1)), loop, instances) - rest
+        half = _flown(_scaled(calm, deviations, 0.5 ** (halving + 1)), signals, loop, instances) - rest
         if len(whole) == len(half):
-            size, apart = (np.abs(x).max(axis=0) for x in (whole, whole - 2.0 * half))
-            found = float((np.maximum(apart - weight, 0.0) / np.maximum(size, weight)).max(initial=0.0))
-            if 4.0 * found <= TOLERATED:
+            twice = np.where(np.abs(whole - 2.0 * half) > weight, 2.0 * half, whole)
+            found = max((_apart(mean, signals, whole, twice) for mean in means), default=0.0)
+            if 2.0 * found <= TOLERATED:
                 if halving == 0:
                     return found
                 break
@@ -174,21 +191,30 @@ def _nonlinearity(
     )
 
 
-def _flown(system: System, loop: AtRest, instances: Instances) -> Floats:
-    """The exchanged signals at the begin of each period until the end of the run."""
+def _apart(mean: Mean, signals: Sequence[str], one: Floats, other: Floats) -> float:
+    """By how much the deviation of a mean from that at rest differs between two motions, relative to its terms."""
+    places = [signals.index(name) for name in mean.signals]
+    x, y = one[:, places], other[:, places]
+    apart = (x - y) @ mean.g + (((x - y) @ mean.Q) * (x + y)).sum(axis=1)
+    size = np.abs(x) @ np.abs(mean.g) + ((np.abs(x) @ np.abs(mean.Q)) * np.abs(x)).sum(axis=1)
+    return float(abs(apart.sum()) / size.sum()) if size.sum() > 0.0 else 0.0
+
+
+def _flown(system: System, signals: Sequence[str], loop: AtRest, instances: Instances) -> Floats:
+    """The `signals` at the begin of each period until the end of the run."""
     count = min(int(exact_nanoseconds(system.stop_time) / loop.period), FLOWN)
     with prepared(system, load=tracing_loader(instances)) as run:
         run.master.initialise()
-        rows = [_exchanged(run.master, system)]
+        rows = [_values(run.instances, signals)]
         for k in range(1, count + 1):
             if run.master.run(pause_at=round(k * loop.period)) and run.master.divergence is not None:
                 break
-            rows.append(_exchanged(run.master, system))
-    return np.array(rows, dtype=float)
+            rows.append(_values(run.instances, signals))
+    return np.array(rows)
 
 
-def _exchanged(master: Master, system: System) -> list[float]:
-    return [master.board.row[master.board.place[signal]] for signal in exchanged_signals(system)]
+def _values(instances: Mapping[str, Instance], signals: Sequence[str]) -> Floats:
+    return np.array([float(instances[component_of(name)].get(variable_of(name))) for name in signals])
 
 
 def _outputs(instance: Instance, names: tuple[str, ...]) -> Floats:

@@ -128,7 +128,8 @@ class Loops:
             parts = {name: one.part for name, one in known.items()}
             if initial is not None:
                 tangents = {name: one.tangent for name, one in known.items()}
-                initial_state = initial_state_of(initial, loop, parts, tangents, self._instances)
+                means = objectives.means.values()
+                initial_state = initial_state_of(initial, loop, parts, tangents, means, self._instances)
         methods = {name: one.method for name, one in known.items()}
         accuracy = max((one.accuracy for one in known.values()), default=0.0)
         precision = max((one.precision for one in known.values()), default=0.0)

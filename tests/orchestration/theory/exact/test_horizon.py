@@ -13,9 +13,12 @@ from orchestration.components.building import fmus
 from orchestration.components.scaffold.folder import write
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.file import load_system
+from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion
 from orchestration.systems.system.paths import changed
-from orchestration.theory.exact.expect import Expected, expect
+from orchestration.theory.exact import initial_state
+from orchestration.theory.exact.expect import Expected, expect, expected_of
+from orchestration.theory.exact.loops import Loops
 from quadcosim import UsageError, run
 from tests.commands import Main
 from tests.examples.common import native_example as example
@@ -148,7 +151,7 @@ def test_a_start_at_which_a_component_is_not_linear_is_refused_by_name() -> None
         servo, objectives={"cost": "mean(servo.angle ** 2)"},
         operating_point={**dict.fromkeys(("components.servo.parameters.initial.angle", speed), 0.0), constant: 2.0},
     )  # fmt: skip
-    with pytest.raises(UsageError, match=r"its initial state is not linear .* at most 0.00781 times as far"):
+    with pytest.raises(UsageError, match=r"its initial state is not linear .* at most 0.0156 times as far"):
         expect(driven, horizon=1.0)
 
 
@@ -164,9 +167,32 @@ def test_the_cost_from_a_pendulum_that_leans_is_linear_theory_and_says_how_far_i
     little, far = leaning(1e-5), leaning(0.1)
     costs = [one.objectives["cost"] or math.nan for one in (little, far)]
     assert costs[0] * 1e8 == pytest.approx(costs[1], rel=1e-6)
-    assert little.accuracy < 1e-6 < 1e-4 < far.accuracy < 1e-2
+    ran = run(changed(upright, {"components.plant.parameters.initial.angle": math.pi + 0.1, "stop_time": 1.0}))
+    simulated = expect(ran.system, horizon=1.0, as_simulated=True).objectives["cost"]
+    assert little.accuracy < 1e-6 < abs(ran.metrics["cost"] / simulated - 1.0) < far.accuracy < 2e-3
     with pytest.raises(UsageError, match=r"expected initial values at most 0\.\d+ times as far from it"):
         leaning(1.0)
+
+
+@pytest.mark.parametrize("saturated", [0.1, 0.0])
+def test_coordinates_are_measured_nearer_to_rest_where_a_tenth_of_the_way_is_no_better(
+    monkeypatch: pytest.MonkeyPatch, saturated: float
+) -> None:
+    measured = initial_state._measured
+
+    def far(*given: Any) -> tuple[initial_state.InitialState, str]:
+        found, worst = measured(*given)
+        share = given[5] if len(given) > 5 else 1.0
+        return (found if share < saturated else dataclasses.replace(found, accuracy=0.17)), worst
+
+    monkeypatch.setattr(initial_state, "_measured", far)
+    system = at_zero(example("minimum_variance", {START: 3.0}))
+    loops = Loops(files_of(system).models)
+    if saturated:
+        assert expected_of(system, loops, 7.0).objectives["variance"] == pytest.approx(by_hand(3.0, 7), rel=1e-9)
+    else:
+        with pytest.raises(UsageError, match=r"plant: .* its inputs do not reach .* misses 0\.2 of it"):
+            expected_of(system, loops, 7.0)
 
 
 @pytest.mark.parametrize("horizon", [0.0, -1.0, math.inf, math.nan])
