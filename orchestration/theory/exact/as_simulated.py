@@ -1,6 +1,6 @@
 """The effects of events in a simulated loop: held noise, steps of components, means over the rows of the run."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -24,11 +24,17 @@ class SimulatedEffects(LoopEffects):
     holds_wires = True
 
     def __init__(
-        self, system: System, components: Components, tasks: Sequence[str], *, with_means: bool = False
+        self,
+        system: System,
+        components: Components,
+        tasks: Sequence[str],
+        *,
+        with_means: bool = False,
+        steps: Mapping[str, float] | None = None,
     ) -> None:
         """Each value of noise is held for the period of its source."""
         self.noise = [name for name, source in system.sources.items() if source.noise]
-        super().__init__(system, components, tasks, with_means=with_means)
+        super().__init__(system, components, tasks, with_means=with_means, steps=steps)
         self._plan = Plan(system)
         self._flows = {
             name: Flows(*_with_held_inputs(part)) for name, part in self.continuous.items() if part.unfit is None
@@ -61,7 +67,7 @@ class SimulatedEffects(LoopEffects):
         source = component_of(name)
         if source in self.noise:
             return self.row("noise", source, self.system.sources[source].signals(source).index(name))
-        return np.zeros(self.size)
+        return super()._source_row(name)
 
     def input_row(self, end: str) -> Floats:
         """As `LoopEffects`, with noise."""

@@ -50,9 +50,18 @@ class LoopEffects(ABC):
     """What events do to the state: the numbers of the loop, followed by those of the messages in transit, in order."""
 
     def __init__(
-        self, system: System, components: Components, tasks: Sequence[str], *, with_means: bool = False
+        self,
+        system: System,
+        components: Components,
+        tasks: Sequence[str],
+        *,
+        with_means: bool = False,
+        steps: Mapping[str, float] | None = None,
     ) -> None:
-        """`with_means` one number of the state is the constant 1, so that second moments contain means."""
+        """`with_means` one number of the state is the constant 1, so that second moments contain means.
+
+        Then sources, by name, may take `steps` from rest at the begin.
+        """
         self.system, self.parts, self.tasks = system, components, list(tasks)
         self.places = places = Places()
         self.wires = {system.connections[i].name for i in Plan(system).wires}
@@ -76,6 +85,11 @@ class LoopEffects(ABC):
         self.size = places.size
         self.costs = 0
         self._noise = {x.name: _noise_of(x) for x in system.connections}
+        self._steps = steps or {}
+        self._stepped = {end: step for name, step in self._steps.items() for end in system.sources[name].to}
+        for end in self._stepped:
+            if variable_of(end) not in components[component_of(end)].inputs:
+                raise UsageError(f"{end} takes a step: expected a Real input")
 
     holds_wires = False
     """whether the value of a wire is held from step to step"""
@@ -149,7 +163,7 @@ class LoopEffects(ABC):
                 return self.row("received", x.name, j)
             sender = self.continuous[x.sender]
             return x.scale * self.output_row(x.sender, sender.outputs.index(variable_of(x.start[j])))
-        return np.zeros(self.size)
+        return self._step_row(self._stepped.get(end, 0.0))
 
     def input_rows(self, name: str) -> Floats:
         """The rows of all inputs of a component."""
@@ -167,7 +181,11 @@ class LoopEffects(ABC):
         """The row of an output of a component in continuous time."""
 
     def _source_row(self, name: str) -> Floats:
-        return np.zeros(self.size)
+        return self._step_row(self._steps.get(component_of(name), 0.0))
+
+    def _step_row(self, step: float) -> Floats:
+        """The row of what takes a step from rest at the begin; 0: none."""
+        return step * self.row("constant", "", 0) if step else np.zeros(self.size)
 
     # -- events ---------------------------------------------------------------------------------------------------
 
@@ -269,9 +287,10 @@ class ContinuousEffects(LoopEffects):
         noise: Mapping[str, float] | None = None,
         *,
         with_means: bool = False,
+        steps: Mapping[str, float] | None = None,
     ) -> None:
         """`noise` has the intensities of white noise by input."""
-        super().__init__(system, components, tasks, with_means=with_means)
+        super().__init__(system, components, tasks, with_means=with_means, steps=steps)
         self._outputs = self._algebra(noise or {})
 
     def _algebra(self, noise: Mapping[str, float]) -> dict[str, Floats]:
@@ -325,6 +344,8 @@ class ContinuousEffects(LoopEffects):
                 elif variable_of(x.start[i]) in self.continuous[x.sender].outputs:
                     k = self.continuous[x.sender].outputs.index(variable_of(x.start[i]))
                     held[j], white[j] = x.scale * rows[x.sender][k], x.scale * noisy[x.sender][k]
+            else:
+                held[j] = self.input_row(end)
         return held, white
 
     def _continuous_output_row(self, name: str, j: int) -> Floats:

@@ -15,7 +15,7 @@ from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.model import AFTER, System
 from orchestration.systems.system.paths import at_operating_point, changed, parameter_name
-from orchestration.theory.exact.objectives import Mean
+from orchestration.theory.exact.objectives import Mean, constant_signals
 from orchestration.theory.stability.linearised_component import LINEAR, Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest, tracing_loader
 from orchestration.theory.stability.matrices import Components
@@ -51,6 +51,13 @@ class InitialState:
     """Error of quadratic costs from here, relative: of the coordinates, and by what is not linear"""
 
 
+def steps_of(system: System) -> dict[str, float]:
+    """By how much constants of sources differ from those at the operating point, by source."""
+    rests = at_operating_point(system).sources
+    steps = {name: (one.constant or 0.0) - (rests[name].constant or 0.0) for name, one in system.sources.items()}
+    return {name: step for name, step in steps.items() if step}
+
+
 def initial_state_of(
     system: System,
     loop: AtRest,
@@ -64,12 +71,14 @@ def initial_state_of(
     Runs from it and from half of it, to the `stop_time`, show how nearly the `means` are those of a linear loop. Raises
     `UsageError` where that is too little, naming the share of the deviation from which it is enough.
     """
+    _expect_steady_sources(system)
     if time_to_rest(system):
+        held = [f"sources.{name}.constant" for name, source in system.sources.items() if source.constant is not None]
         raise UsageError(
-            f"operating_point.{AFTER}: over a horizon initial values count by how far they are from those at rest: "
-            f"expected these in [operating_point], without {AFTER}"
+            f"operating_point.{AFTER}: over a horizon initial values, and constants of sources, count by how far they "
+            f"are from those at rest: expected in [operating_point] values at which it rests, "
+            f"{'as initial ones' if not held else f'as initial ones and {held[0]}'}, without {AFTER}"
         )
-    _expect_same_sources(system)
     calm = deterministic(replace(system, operating_point={}))
     prompt = {
         name: one if one.sampling is None else replace(one, sampling=replace(one.sampling, offset=0.0))
@@ -133,13 +142,13 @@ def _measured(
         received={
             x.name: (now - then) / factor for x, now, then in zip(system.connections, received, received_at_rest)
         },
-        accuracy=measured[worst][1] / size if size > 0.0 else 0.0,
+        accuracy=measured[worst][1] / size if size > ROUNDED * factor else 0.0,
     )
     return found, worst
 
 
 def _deviations(system: System, calm: System, instances: Instances) -> dict[str, tuple[float, float]]:
-    """The real parameters that differ from the operating point, by path: their values there, and here."""
+    """The real parameters and constants that differ from the operating point, by path: their values there, and here."""
     named = {path: name for path in system.operating_point if (name := parameter_name(path)) is not None}
     found = {}
     with prepared(calm, load=tracing_loader(instances)) as run:
@@ -151,6 +160,9 @@ def _deviations(system: System, calm: System, instances: Instances) -> dict[str,
                 here = float(instance.get(variable_of(name)))
                 if here != there:
                     found[path] = float(there), here
+    rests = at_operating_point(system)
+    for name in steps_of(system):
+        found[f"sources.{name}.constant"] = rests.sources[name].constant or 0.0, calm.sources[name].constant or 0.0
     return found
 
 
@@ -170,7 +182,7 @@ def _nonlinearity(
     From a share of a deviation a mean is off by at least half as much less: the whole error is at most twice this.
     """
     signals = tuple(dict.fromkeys(signal for mean in means for signal in mean.signals))
-    rest = _values(loop.simulation.instances, signals)
+    rest = _values(loop.simulation.instances, signals, loop.simulation.system)
     weight = ROUNDED * np.maximum(1.0, np.abs(rest))
     whole = _flown(calm, signals, loop, instances) - rest
     for halving in range(HALVINGS):
@@ -205,28 +217,33 @@ def _flown(system: System, signals: Sequence[str], loop: AtRest, instances: Inst
     count = min(int(exact_nanoseconds(system.stop_time) / loop.period), FLOWN)
     with prepared(system, load=tracing_loader(instances)) as run:
         run.master.initialise()
-        rows = [_values(run.instances, signals)]
+        rows = [_values(run.instances, signals, system)]
         for k in range(1, count + 1):
             if run.master.run(pause_at=round(k * loop.period)) and run.master.divergence is not None:
                 break
-            rows.append(_values(run.instances, signals))
+            rows.append(_values(run.instances, signals, system))
     return np.array(rows)
 
 
-def _values(instances: Mapping[str, Instance], signals: Sequence[str]) -> Floats:
-    return np.array([float(instances[component_of(name)].get(variable_of(name))) for name in signals])
+def _values(instances: Mapping[str, Instance], signals: Sequence[str], system: System) -> Floats:
+    known = {key: value for name, one in system.sources.items() for key, value in constant_signals(name, one).items()}
+    return np.array(
+        [
+            known[name] if name in known else float(instances[component_of(name)].get(variable_of(name)))
+            for name in signals
+        ]
+    )
 
 
 def _outputs(instance: Instance, names: tuple[str, ...]) -> Floats:
     return np.array([float(instance.get(name)) for name in names])
 
 
-def _expect_same_sources(system: System) -> None:
-    """Raise `UsageError` for a source that drives the system away from rest."""
-    at_rest = at_operating_point(system)
+def _expect_steady_sources(system: System) -> None:
+    """Raise `UsageError` for a source that drives the system away from rest but by a step at the begin."""
     for name, source in system.sources.items():
-        if not source.is_held or source.constant != at_rest.sources[name].constant:
+        if not source.is_held:
             raise UsageError(
-                f"sources.{name}: expected noise, or a constant that is the same at the operating point: over a "
-                "horizon only initial conditions differ from it"
+                f"sources.{name}: expected noise, or a constant, which may differ at the operating point: a step as "
+                "the horizon begins"
             )

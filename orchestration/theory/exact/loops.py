@@ -25,7 +25,7 @@ from orchestration.systems.system.paths import at_operating_point
 from orchestration.theory.exact.as_simulated import SimulatedEffects, expect_rows
 from orchestration.theory.exact.components import ComponentIdentifier
 from orchestration.theory.exact.effects import ContinuousEffects, LoopEffects
-from orchestration.theory.exact.initial_state import InitialState, initial_state_of
+from orchestration.theory.exact.initial_state import InitialState, initial_state_of, steps_of
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
@@ -121,7 +121,8 @@ class Loops:
         noise = _white_noise(system, simulated=self.simulated)
         models = {name: self._models[component.fmu] for name, component in system.components.items()}
         objectives, initial_state = ObjectiveMeans(system, models), None
-        extra = ExtraSignals(inputs=tuple(noise), outputs=objectives.outputs)
+        stepped = [] if initial is None else [end for name in steps_of(initial) for end in initial.sources[name].to]
+        extra = ExtraSignals(inputs=(*noise, *stepped), outputs=objectives.outputs)
         with at_rest(system, self._instances, extra=extra, models=models) as loop:
             objectives.expand_about(loop)
             known = self._identifier.of(loop)
@@ -178,7 +179,7 @@ class Loops:
         rests = at_operating_point(system)
         linear = self.linear(rests, initial=replace(system, stop_time=horizon))
         used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q) or np.any(mean.g)]
-        effects = self._effects(rests, linear, used, with_means=True)
+        effects = self._effects(rests, linear, used, with_means=True, steps=steps_of(system))
         assert linear.initial is not None
         start, constant = effects.initial_vector(linear.initial), effects.places("constant", "").start
         end = attoseconds(exact_seconds(horizon))
@@ -222,15 +223,21 @@ class Loops:
         )  # fmt: skip
 
     def _effects(
-        self, system: System, linear: Linear, used: Sequence[Call], *, with_means: bool = False
+        self,
+        system: System,
+        linear: Linear,
+        used: Sequence[Call],
+        *,
+        with_means: bool = False,
+        steps: Mapping[str, float] | None = None,
     ) -> LoopEffects:
         """The effects, with these means as costs."""
         names = Plan(system).sampled
         effects: LoopEffects
         if self.simulated:
-            effects = SimulatedEffects(system, linear.parts, names, with_means=with_means)
+            effects = SimulatedEffects(system, linear.parts, names, with_means=with_means, steps=steps)
         else:
-            effects = ContinuousEffects(system, linear.parts, names, linear.noise, with_means=with_means)
+            effects = ContinuousEffects(system, linear.parts, names, linear.noise, with_means=with_means, steps=steps)
         effects.charge([linear.objectives.means[call] for call in used])
         return effects
 

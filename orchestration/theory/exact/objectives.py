@@ -172,7 +172,7 @@ class ObjectiveMeans:
             for signal in self._signals
         }
         for name, source in self._system.sources.items():
-            rest |= _constant_signals(name, source)
+            rest |= constant_signals(name, source)
         self._numbers = loop.simulation.parameters
         for name, calls in [*self.calls.items()]:
             try:
@@ -194,7 +194,7 @@ class ObjectiveMeans:
         return found
 
 
-def _constant_signals(name: str, source: Source) -> dict[str, float]:
+def constant_signals(name: str, source: Source) -> dict[str, float]:
     """The signals of a source that is constant but for noise; none of any other."""
     if source.signal == AT_REST:
         places = {f"position.{axis}": source.scale * source.parameters.get(axis, 0.0) for axis in "xyz"}

@@ -12,6 +12,7 @@ import pytest
 from orchestration.components.building import fmus
 from orchestration.components.scaffold.folder import write
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.systems.system.connection import Source
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion
@@ -124,6 +125,32 @@ def test_without_chance_it_is_what_a_run_prints(changes: dict[str, Any]) -> None
     found = expect(system, horizon=3.3, as_simulated=True)
     printed = run(system, progress=None, announce=None).metrics
     assert found.objectives == pytest.approx({name: printed[name] for name in system.objectives}, rel=1e-8)
+
+
+def test_a_step_of_a_source_is_an_input_from_the_begin_on() -> None:
+    """Of a plant by hand, and of a set point as a run prints it, from an initial value elsewhere."""
+    whole = example("minimum_variance")
+    load = Source(constant=0.3, to=("plant.w",))
+    rests = {"sources.load.constant": 0.0, START: 0.0}
+    system = changed(dataclasses.replace(whole, sources={"load": load}, operating_point=rests), {START: 2.0})
+    x, cost = 2.0, 0.0
+    for _ in range(7):
+        rate = 0.3 - GAIN * x
+        cost += x**2 + x * rate + rate**2 / 3.0
+        x += rate
+    assert expect(system, horizon=7.0).objectives["variance"] == pytest.approx(cost / 7.0, rel=1e-9)
+    with pytest.raises(UsageError, match=r"as initial ones and sources.load.constant, without after"):
+        expect(dataclasses.replace(system, operating_point={"after": 100.0}), horizon=7.0)
+
+    servo = dataclasses.replace(
+        example("dc_servo", {LOSS: 0.0, f"{COMMAND}.delay_jitter": 0.0, "stop_time": 0.5}), criterion=Criterion(),
+        sources={"wanted": Source(constant=0.2, to=("controller.reference",))},
+        operating_point={"sources.wanted.constant": 0.0, "components.servo.parameters.initial.angle": 0.0},
+        objectives={"error": "mean((servo.angle - wanted.reference) ** 2)", "effort": "rms(controller.u)"},
+    )  # fmt: skip
+    printed = run(servo, progress=None, announce=None).metrics
+    found = expect(servo, horizon=0.5, as_simulated=True).objectives
+    assert found == pytest.approx({name: printed[name] for name in servo.objectives}, rel=1e-8)
 
 
 def test_over_all_that_may_be_lost_runs_print_on_average_what_is_expected() -> None:
