@@ -201,13 +201,16 @@ def test_workers_need_no_guard_of_the_main_module_and_ctrl_c_keeps_what_was_flow
     assert (tmp_path / "study.sqlite").is_file()
 
 
-def test_a_limit_is_a_table_of_what_was_tried(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_limit_is_a_table_of_what_was_tried() -> None:
     tank = EXAMPLES / "water_tank" / "system.toml"
     system = quadcosim.changed(quadcosim.load_system(tank), {"stop_time": 5.0})
-    found = quadcosim.limit(system, "connections.valve.delay", first=0.0, last=0.2, scan=0.1, tolerance=0.05)
+    told = list[str]()
+    found = quadcosim.limit(
+        system, "connections.valve.delay", first=0.0, last=0.2, scan=0.1, tolerance=0.05, announce=told.append
+    )
     assert found.to_pandas()["value"].tolist() == [one.value for one in found.tried]
     assert repr(found) == f"<Limit: {found.verdict}>"
-    assert "connections.valve.delay 100 ms: good" in capsys.readouterr().err
+    assert "connections.valve.delay 100 ms: good" in told
     assert "last value that is good" in found._repr_html_()
     figure = found.plot(style="paper")["limit"]
     assert figure.get_figwidth() == pytest.approx(STYLES["paper"].width / 25.4)

@@ -118,7 +118,7 @@ class LateCommand:
     sensitivities: dict[float, Sensitivity] = field(default_factory=dict)
     """The sensitivity of that command over its samples"""
     soon: dict[float, Complexes] = field(default_factory=dict)
-    """That at the frequencies"""
+    """Its values at the frequencies"""
 
     @property
     def sides(self) -> list[float]:
