@@ -67,6 +67,14 @@ def test_types_arrays_and_held_inputs_are_those_of_fmpy(
     assert Path("out.csv").read_text() == by_fmpy(fmu, inputs, output=["on"], **how), "inputs are recorded, too"
 
 
+@needs_compiler
+def test_the_largest_integer_is_in_the_file_what_it_is_by_fmpy(main: Main, here: Path) -> None:
+    fmu = known(small(here, fmi=3, more='<Int64 name="most" valueReference="11" causality="output"/>'))
+    main("run", fmu, "--in-process", "--output", "out.csv", "--output-interval", "0.5", "--record", "most")
+    assert Path("out.csv").read_text() == by_fmpy(fmu, output=["most"], output_interval=0.5, stop_time=1.0)
+    assert str(2**63 - 1) in Path("out.csv").read_text()
+
+
 def test_without_flags_the_default_experiment_runs_as_in_fmpy(built: dict[str, Path]) -> None:
     system = load_request(built["QuadrotorPlant"]).as_system()
     (component,) = system.components.values()

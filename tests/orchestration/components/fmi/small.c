@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #define API __attribute__((visibility("default")))
-enum { U, Y, GAIN, ON, HIGH, COUNT, MODE, LABEL, TIME = 10 };
+enum { U, Y, GAIN, ON, HIGH, COUNT, MODE, LABEL, TIME = 10, MOST };
 enum { OK, WARNING, DISCARD, ERROR };
 
 typedef void (*Log2)(void *, const char *, int, const char *, const char *, ...);
@@ -333,7 +333,7 @@ API int fmi3GetBoolean(void *c, const unsigned vr[], size_t n, bool v[], size_t 
 }
 API int fmi3SetBoolean(void *c, const unsigned vr[], size_t n, const bool v[], size_t m) { ((Model *)c)->s.on = *v; return OK; }
 API int fmi3GetUInt8(void *c, const unsigned vr[], size_t n, uint8_t v[], size_t m) { *v = ((Model *)c)->s.count; return OK; }
-API int fmi3GetInt64(void *c, const unsigned vr[], size_t n, int64_t v[], size_t m) { *v = ((Model *)c)->s.mode; return OK; }
+API int fmi3GetInt64(void *c, const unsigned vr[], size_t n, int64_t v[], size_t m) { *v = vr[0] == MOST ? INT64_MAX : ((Model *)c)->s.mode; return OK; }
 API int fmi3SetInt64(void *c, const unsigned vr[], size_t n, const int64_t v[], size_t m) { ((Model *)c)->s.mode = *v; return OK; }
 
 API int fmi3GetFMUState(void *c, void **state) {
