@@ -33,7 +33,8 @@ def convert_value(variable: Variable, value: object, place: str) -> Value:
     """
     converted = _of_its_type(variable, value, place)
     if variable.is_constant and number_of(variable, converted) != number_of(variable, variable.start):
-        raise UsageError(f"{place} = {shown(value)}: expected {variable.start}, which is fixed in this FMU")
+        fixed = f"{variable.start}, which is fixed in this FMU: it is {variable.role}"
+        raise UsageError(f"{place} = {shown(value)}: expected {fixed}")
     return converted
 
 

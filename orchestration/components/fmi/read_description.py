@@ -73,6 +73,14 @@ class Variable:
         return self.name.rpartition("[")[0] if self.length else self.name
 
     @property
+    def role(self) -> str:
+        """Its causality in words with an article, with the variability of a local variable or a constant."""
+        shown = f"{self.causality} variable" if self.causality == "local" else self.causality
+        if self.causality == "local" or self.variability == "constant":
+            shown = f"{self.variability} {shown}"
+        return f"a{'n' if shown[0] in 'aeiou' else ''} {shown}"
+
+    @property
     def is_settable(self) -> bool:
         """Whether it is a parameter or an input."""
         return self.causality in ("parameter", "input", "structuralParameter")

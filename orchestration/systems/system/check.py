@@ -34,7 +34,7 @@ def check(system: System, models: Mapping[str, Model]) -> None:
             if variable.kind not in NUMERIC:
                 raise UsageError(f"{place}.record: {recorded} is a {variable.kind}: only numbers can be recorded")
             if variable.causality not in ("output", "local", "input"):
-                is_other = f"{recorded} is {_with_article(variable)}"
+                is_other = f"{recorded} is {variable.role}"
                 raise UsageError(f"{place}.record: {is_other}; expected an output, a local or an input")
     for x in system.connections:
         for end_key, ends, causality in (("from", x.start, "output"), ("to", x.end, "input")):
@@ -182,12 +182,7 @@ def _wrong_causality(end: End, expected: str, valid: Iterable[str]) -> str:
     name, model, variable = end
     if variable is None:
         return _missing_variables(model, expected, [variable_of(name)])
-    return f"{name} is {_with_article(variable)}; expected an {expected}: {listed(valid)}"
-
-
-def _with_article(variable: Variable) -> str:
-    shown = variable.causality if variable.causality != "local" else f"{variable.variability} local variable"
-    return f"a{'n' if shown[0] in 'aeiou' else ''} {shown}"
+    return f"{name} is {variable.role}; expected an {expected}: {listed(valid)}"
 
 
 def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, is_fed: bool = False) -> None:
@@ -195,7 +190,7 @@ def expect_parameter(place: str, model: Model, name: str, value: Parameter, *, i
     variable = model.variable(name, place)
     if not (variable.is_settable or variable.has_settable_start or variable.is_constant) or is_fed:
         expected = "a parameter, an input that nothing is connected to, or a variable whose start value can be set"
-        raise UsageError(f"{place}: is {'connected' if is_fed else _with_article(variable)}; expected {expected}")
+        raise UsageError(f"{place}: is {'connected' if is_fed else variable.role}; expected {expected}")
     if isinstance(convert_value(variable, value, place), float) and not is_finite(value):
         raise UsageError(f"{place} = {value}: expected a finite number")
     low, high = variable.minimum, variable.maximum
