@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from orchestration.experiments.comparison.design import (
     FMU,
@@ -16,7 +16,7 @@ from orchestration.experiments.comparison.design import (
     over_second_axis,
 )
 from orchestration.experiments.studies.axes import Axis, Key, Value
-from orchestration.experiments.studies.study_file import AxisTable, FileLike, axis_of, control_loop_of, load
+from orchestration.experiments.studies.study_file import OF_BASE, AxisTable, FileLike, axis_of, control_loop_of, load
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed
 from orchestration.foundation.basics.records import record
@@ -91,6 +91,7 @@ class ComparisonFile:
     """The path of the scenario file that all runs modify."""
     base: dict[str, Any] = field(default_factory=dict)
     """Instead of `scenario`, the tables of a scenario file."""
+    ELSEWHERE: ClassVar[Mapping[str, str]] = OF_BASE
 
 
 def load_comparison(comparison: Comparison | FileLike) -> Comparison:

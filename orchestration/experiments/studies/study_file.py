@@ -40,6 +40,11 @@ class AxisTable:
     """Whether the range has equal steps or equal ratios."""
 
 
+OF_BASE = dict.fromkeys(
+    ("stop_time", "components"),
+    'it is of a system or scenario file, which scenario = "FILE.toml" names here; or expected under [base]',
+)
+"""Hints where the keys of a base belong, for every file that has one"""
 METRICS = "metrics of your own are expressions under [base.objectives], or [objectives] of the scenario or system file"
 
 
@@ -68,6 +73,7 @@ class StudyFile:
     keep_signals: list[int] | bool = False
     """The runs whose signals are kept, by their index in the design; true for all."""
     ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        **OF_BASE,
         "metrics": METRICS,
         "objectives": METRICS,
         "controllers": "parameters of one of several controllers stand under [controllers.NAME] of a vehicle file, "
@@ -150,7 +156,8 @@ def control_loop_of(file: HasBase, folder: Path, otherwise: str = "") -> Control
     """
     base = base_of(file, folder)
     if not isinstance(base, ControlLoop):
-        raise UsageError("base: expected a scenario of the quadrotor, whose initial conditions are known" + otherwise)
+        known = f"a scenario of the quadrotor, whose initial conditions are known{otherwise}"
+        raise UsageError(f"base: expected {known}; runs of any system, and costs of them, are for quadcosim sweep")
     return base
 
 

@@ -1,11 +1,19 @@
 """Reads tuning files, and writes files of tuned parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from orchestration.experiments.studies.study_file import AxisTable, FileLike, axis_of, base_of, control_loop_of, load
+from orchestration.experiments.studies.study_file import (
+    OF_BASE,
+    AxisTable,
+    FileLike,
+    axis_of,
+    base_of,
+    control_loop_of,
+    load,
+)
 from orchestration.experiments.tuning.exact import ExactTuning
 from orchestration.experiments.tuning.tuning import Tuning
 from orchestration.experiments.tuning.tuning_problem import SearchResult, TuningProblem
@@ -58,6 +66,10 @@ class TuningFile:
     """The path of the scenario file, or with `expect` of the system file, whose parameters are tuned."""
     base: dict[str, Any] = field(default_factory=dict)
     """The same given here instead of in a separate file: its tables."""
+    ELSEWHERE: ClassVar[Mapping[str, str]] = {
+        key: f'{hint}; the cost of a system is by = "expect" under [cost], and one by runs is for quadcosim sweep'
+        for key, hint in OF_BASE.items()
+    }
 
 
 def load_tuning(tuning: Tuning | ExactTuning | FileLike) -> Tuning | ExactTuning:
@@ -82,11 +94,11 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
             if present:
                 raise UsageError(f'{key}: expected none with cost.by = "expect", which makes no runs')
         return ExactTuning(base=base_of(file, path.parent), **common)
+    base = control_loop_of(file, path.parent, ', or cost.by = "expect" for another system')
     if file.cost.bad is None:
         raise UsageError("cost.bad: expected a value")
     starts = file.starts or StartsTable()
     ensemble = Starts(**starts.as_dict(without=("judged",)))
-    base = control_loop_of(file, path.parent, ', or cost.by = "expect" for another system')
     return Tuning(base=base, **common, bad=file.cost.bad, starts=ensemble, judged=starts.judged)
 
 

@@ -1,16 +1,19 @@
 """Study files: their content, and errors for invalid ones."""
 
 import re
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
+from orchestration.experiments.comparison.file import load_comparison
 from orchestration.experiments.studies.checks import check_design
 from orchestration.experiments.studies.run_columns import RunColumns
 from orchestration.experiments.studies.run_key import design_parts, difference, study_parts
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
+from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.simulation.requests.ranges import unit_at
 from orchestration.systems.system.distribution import Distribution
@@ -220,6 +223,19 @@ def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
 def test_an_unknown_key_is_reported_with_the_known_ones(tmp_path: Path, text: str, place: str, valid: str) -> None:
     line = refused(tmp_path, text)
     assert f"{place}: no such key; expected one of {valid}" in line
+
+
+@pytest.mark.parametrize("load", [load_study, load_comparison, load_tuning])
+@pytest.mark.parametrize("key", ["stop_time = 1.0", "components.servo.step = 0.1"])
+def test_a_system_in_place_of_a_file_that_names_one_is_refused_with_what_names_it(
+    load: Callable[[Path], object], key: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "system.toml"
+    path.write_text(key)
+    with pytest.raises(
+        UsageError, match=r"m\.toml: (stop_time|components): no such key; .*, which scenario = .FILE\.t"
+    ):
+        load(path)
 
 
 def test_metrics_of_ones_own_are_objectives_of_the_base_and_elsewhere_the_error_says_so(tmp_path: Path) -> None:

@@ -166,6 +166,7 @@ def test_an_interrupted_tuning_continues(tuning, tmp_path):
     ("before", "after", "named"),
     [
         ('bad = 10.0', 'bad = 10.0\nworse = 1', "cost.worse: no such key; expected one of of, by, bad"),
+        ("bad = 10.0", "", "cost.bad: expected a value"),
         ("stop = 20.0", "", "axis surface: expected values, or start and stop, with number or to be sampled"),
         ("start = 0.5\nstop = 20.0", "values = [1.0]", "parameters surface: expected start and stop, and what it sets"),
         ("seeds = [1, 2]", "seeds = []", "seeds: expected at least one"),
