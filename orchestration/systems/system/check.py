@@ -81,16 +81,21 @@ def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str,
     """The variables to record of each component beside exchanged ones: its `record`, or all outputs and local Reals.
 
     Without `record`, constants are left out. A variable in an expression, by its name or as a part of a vector, is
-    recorded in any case.
+    recorded in any case, as is an input of a sampled component, with what its last sample took.
     """
     texts = {name for _, expression in expressions(system) for name in names(parse(expression))}
     named = texts.union(f"{name}.{axis}" for name in texts for axis in "xyzw")
     found = {}
     for name, component in system.components.items():
         model = models[name]
+        kinds = ("output", "local") if component.sampling is None else ("output", "local", "input")
+        needed = [
+            v.name
+            for v in model.variables.values()
+            if f"{name}.{v.name}" in named and v.kind in NUMERIC and v.causality in kinds
+        ]
         if component.record is not None:
-            needed = [v.name for v in model.variables.values() if f"{name}.{v.name}" in named and _is_recordable(v)]
-            found[name] = (*component.record, *(v for v in needed if v not in component.record))
+            found[name] = (*dict.fromkeys((*component.record, *needed)),)
             continue
         unnamed = {v for v in model.for_solvers if f"{name}.{v}" not in named}
         chosen = [
@@ -99,12 +104,8 @@ def recorded_variables(system: System, models: Mapping[str, Model]) -> dict[str,
             if (v.causality == "output" and v.kind in NUMERIC)
             or (v.causality == "local" and v.kind == "Real" and not v.is_constant and v.name not in unnamed)
         ]
-        found[name] = tuple(chosen)
+        found[name] = (*dict.fromkeys((*chosen, *needed)),)
     return found
-
-
-def _is_recordable(variable: Variable) -> bool:
-    return variable.kind in NUMERIC and variable.causality in ("output", "local")
 
 
 def _has_causality(model: Model, name: str, causality: str) -> bool:

@@ -16,6 +16,7 @@ from orchestration.systems.expressions.over_run import STOP_TIME, TIME, inlined,
 from orchestration.systems.expressions.syntax import Call, names
 from orchestration.systems.system.check import AT_REST
 from orchestration.systems.system.connection import Source, component_of, variable_of
+from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.loop_at_rest import AtRest
 
@@ -178,7 +179,9 @@ class ObjectiveMeans:
             try:
                 for call in calls:
                     if call not in self.means:
-                        self.means[call] = quadratic(integrand(call), rest, self._numbers)
+                        mean = quadratic(integrand(call), rest, self._numbers)
+                        _expect_current(self._system, mean.signals)
+                        self.means[call] = mean
             except UsageError as error:
                 self.reasons[name] = str(error)
                 del self.calls[name]
@@ -192,6 +195,16 @@ class ObjectiveMeans:
             except UsageError as error:
                 self.reasons[name] = str(error)
         return found
+
+
+def _expect_current(system: System, signals: Sequence[str]) -> None:
+    """Raise `UsageError` for an input that a run has as its last sample took it, while a later message is here."""
+    sampled = {name for name, one in system.components.items() if one.sampling is not None}
+    for x in system.connections:
+        waits = x.sender in sampled or x.delay_jitter != 0.0 or highest(x.delay) > 0.0
+        for end in x.end if waits and x.receiver in sampled else ():
+            if end in signals:
+                raise UsageError(f"{end} has what its last sample took: expected {x.start[x.end.index(end)]}")
 
 
 def constant_signals(name: str, source: Source) -> dict[str, float]:

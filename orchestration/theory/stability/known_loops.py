@@ -48,6 +48,14 @@ LOOPS: Registry[KnownLoop] = Registry()
 
 
 def rested(request: Request) -> System:
-    """The system that a request means, as one that is at rest at its operating point."""
+    """The system that a request means, as one that is at rest at its operating point.
+
+    Raises `UsageError` for one that a run refuses, too, be it for an objective.
+    """
     known = LOOPS.of(request.kind)
-    return request.as_system() if known is None else known.at_rest(request)
+    if known is not None:
+        return known.at_rest(request)
+    from orchestration.simulation.engines.resolved import resolve  # not before: loads the engines
+
+    resolve(request)
+    return request.as_system()

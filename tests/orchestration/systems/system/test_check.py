@@ -51,6 +51,14 @@ def test_a_vector_in_an_expression_is_recorded_whole_whatever_is_chosen(
     assert checked(tmp_path, text)["tank"] == (*recorded,)
 
 
+def test_an_input_of_a_sampled_component_is_recorded_where_it_is_named_and_a_source_by_its_own_name(
+    tmp_path: Path,
+) -> None:
+    assert "level" in checked(tmp_path, TANK.replace("tank.level)", "tank.level - controller.level)"))["controller"]
+    with pytest.raises(UsageError, match=r"tank.inflow is no signal of a run: expected rain.inflow, the source that"):
+        checked(tmp_path, TANK.replace("tank.level)", "tank.inflow)"))
+
+
 @pytest.mark.parametrize("stated", ["scale = 1.0", "offset = 0.0", "scale = 1000.0"])
 def test_units_may_differ_where_a_conversion_is_stated(stated: str, tmp_path: Path) -> None:
     differing = TANK.replace('["controller.level"]', '["controller.height"]')

@@ -17,7 +17,7 @@ from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import Source
 from orchestration.systems.system.files import files_of
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.exact import mean_square
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
@@ -79,7 +79,7 @@ def test_objectives_that_are_no_means_of_squares_are_refused_by_name_and_the_rad
 
 
 def test_objectives_may_be_made_of_means_and_of_signals_that_no_connection_carries() -> None:
-    servo = example("dc_servo", {"connections.command.loss": 0.0})
+    servo = dataclasses.replace(example("dc_servo", {"connections.command.loss": 0.0}), criterion=Criterion())
     noisy = dataclasses.replace(
         servo, sources={"torque": Source(noise=1e-4, period=0.001, to=("controller.reference",))}, objectives={}
     )

@@ -146,7 +146,10 @@ def test_a_step_of_a_source_is_an_input_from_the_begin_on() -> None:
         example("dc_servo", {LOSS: 0.0, f"{COMMAND}.delay_jitter": 0.0, "stop_time": 0.5}), criterion=Criterion(),
         sources={"wanted": Source(constant=0.2, to=("controller.reference",))},
         operating_point={"sources.wanted.constant": 0.0, "components.servo.parameters.initial.angle": 0.0},
-        objectives={"error": "mean((servo.angle - wanted.reference) ** 2)", "effort": "rms(controller.u)"},
+        objectives={
+            "error": "mean((servo.angle - wanted.reference) ** 2)", "effort": "rms(controller.u)",
+            "wanted": "mean(controller.reference * servo.angle)",
+        },
     )  # fmt: skip
     printed = run(servo, progress=None, announce=None).metrics
     found = expect(servo, horizon=0.5, as_simulated=True).objectives
@@ -175,7 +178,7 @@ def test_a_start_at_which_a_component_is_not_linear_is_refused_by_name() -> None
     speed, constant = "components.servo.parameters.initial.speed", "components.servo.parameters.time_constant"
     servo = example("dc_servo", {LOSS: 0.0, speed: 1.0})
     driven = dataclasses.replace(
-        servo, objectives={"cost": "mean(servo.angle ** 2)"},
+        servo, objectives={"cost": "mean(servo.angle ** 2)"}, criterion=Criterion(),
         operating_point={**dict.fromkeys(("components.servo.parameters.initial.angle", speed), 0.0), constant: 2.0},
     )  # fmt: skip
     with pytest.raises(UsageError, match=r"its initial state is not linear .* at most 0.0156 times as far"):
