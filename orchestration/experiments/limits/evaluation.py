@@ -8,7 +8,7 @@ from typing import Any
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.statistics import refutes, wilson
 from orchestration.simulation.requests.ranges import Varied
-from orchestration.simulation.results.objectives import judged_objective, unmet
+from orchestration.simulation.results.objectives import judged_objective, missed_objective, unmet
 from orchestration.simulation.workers.executors import RunEvaluator
 
 RELIABILITY = 0.9
@@ -36,7 +36,8 @@ class Evaluation:
     share: tuple[float, float] | None
     """Wilson interval of the share of good seeds, at the confidence; None: nothing is random, or not all were run"""
     measured: float | None = None
-    """the judged objective, of the seed that `outcome` is of or else the first; None: it has no value"""
+    """the judged objective, of the seed that `outcome` is of or else the first; None: it has no value, or is not
+    chosen yet"""
     unmet: str | None = None
     """the part of the criterion that this seed did not meet, in words; None: it was met, or the run diverged"""
 
@@ -60,6 +61,8 @@ class Evaluator:
     announce: Callable[[str], None]
     progress: Callable[[float], None]
     tried: dict[float, Evaluation] = field(default_factory=dict)
+    shown: dict[float, Mapping[str, Any]] = field(default_factory=dict)
+    """The metrics at each value of the seed that `outcome` is of, or else the first"""
     _done: int = 0
     _remaining: int = 0
 
@@ -76,6 +79,19 @@ class Evaluator:
         done = self._run(value, stop=lambda metrics: False)
         return self.confidence is not None and refutes(done.flew, done.runs, RELIABILITY, self.confidence)
 
+    def judged_at(self, value: float | None) -> str | None:
+        """The objective whose bound a value is the first to miss, or else the one that the criterion judges."""
+        missed = None if value is None else missed_objective(self.varied.at(value), self.shown[value])
+        return missed or judged_objective(self.varied.system)
+
+    def measuring(self, metric: str | None) -> tuple[Evaluation, ...]:
+        """All evaluations, in rising order, with the values of an objective."""
+        return tuple(
+            replace(self.tried[value], measured=found if isinstance(found, float) and math.isfinite(found) else None)
+            for value in sorted(self.tried)
+            for found in (self.shown[value].get(metric or ""),)
+        )
+
     def _run(self, value: float, stop: Callable[[Any], bool]) -> Evaluation:
         system = self.varied.at(value)
         runs = [replace(system, seed=system.seed + i) for i in range(self.seeds)]
@@ -86,7 +102,7 @@ class Evaluator:
         self._done += 1
         failed = next((one for one in metrics if not is_good(one)), None)
         good = sum(map(is_good, metrics))
-        measured = metrics[0 if failed is None else metrics.index(failed)].get(judged_objective(system) or "")
+        self.shown[value] = metrics[0] if failed is None else failed
         known = self.confidence is not None and len(metrics) == self.seeds
         evaluation = self.tried[value] = Evaluation(
             value=value,
@@ -95,7 +111,6 @@ class Evaluator:
             flew=good,
             runs=len(metrics),
             share=wilson(good, len(metrics), self.confidence) if known and self.confidence is not None else None,
-            measured=measured if isinstance(measured, float) and math.isfinite(measured) else None,
             unmet=None if failed is None else unmet(system, failed, self.units),
         )
         self.announce(f"{self.varied.of} {self.span.text(value)}: {describe(evaluation)}")

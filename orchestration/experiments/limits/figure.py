@@ -54,7 +54,7 @@ def _draw_values(axes: Axes, result: Limit, across: Quantity) -> None:
         _draw_marks(axes, result.tried, [float(one.is_good) for one in result.tried], across)
         axes.set(yticks=(0.0, 1.0), yticklabels=("not good", "good"), ylim=(-0.3, 1.3))
         return
-    _draw_marks(axes, known, [one.measured or 0.0 for one in known], across)
+    _draw_marks(axes, known, [one.measured or 0.0 for one in known], across, result.judged)
     down = [one.value * across.factor for one in result.tried if one.measured is None]
     axes.plot(
         down, np.full(len(down), 0.97), "^", color=RED, transform=axes.get_xaxis_transform(),
@@ -101,10 +101,14 @@ def _draw_shares(axes: Axes, result: Limit, across: Quantity) -> None:
     axes.set(ylabel=f"share of {result.seeds} seeds that are good", ylim=(-0.05, 1.08))
 
 
-def _draw_marks(axes: Axes, tried: Sequence[Evaluation], heights: list[float], across: Quantity) -> None:
-    """One mark per value: dots where all runs were good, crosses elsewhere."""
-    for good, mark, color, label in ((True, "o", BLUE, "good"), (False, "X", RED, "not good")):
-        chosen = [i for i, one in enumerate(tried) if one.is_good is good]
+def _draw_marks(
+    axes: Axes, tried: Sequence[Evaluation], heights: list[float], across: Quantity, judged: str | None = None
+) -> None:
+    """One mark per value: dots where all runs were good, crosses elsewhere, thin where not for what is `judged`."""
+    kinds = ("o", BLUE, "good"), ("X", RED, "not good"), ("x", RED, "not good for another objective")
+    of_each = [0 if one.is_good else 1 if judged is None or judged in (one.unmet or judged) else 2 for one in tried]
+    for kind, (mark, color, label) in enumerate(kinds):
+        chosen = [i for i, each in enumerate(of_each) if each == kind]
         x, y = [tried[i].value * across.factor for i in chosen], [heights[i] for i in chosen]
         axes.plot(x, y, mark, color=color, markersize=6, label=label if chosen else None)
 

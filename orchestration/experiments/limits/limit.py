@@ -16,7 +16,7 @@ from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
-from orchestration.simulation.results.objectives import bound_of, judged_objective
+from orchestration.simulation.results.objectives import bound_of
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.systems.system.files import Files, files_of
@@ -72,7 +72,7 @@ def limit(
     span = search_range(varied, models, first=first, last=last, tolerance=tolerance, scan=scan)
     with errors_in_own_terms(loop):
         checks = [check_against_fmus(varied.at(value), models) for value in span.values()]
-    units, metric = checks[0].units, judged_objective(varied.system)
+    units = checks[0].units
     random = varied.at(span.last).depends_on_seed
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
     with share_reporter(progress, "limits by linear theory"):  # without shares, as it ends where the limit is
@@ -106,7 +106,8 @@ def limit(
         report(1.0)
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
     note += other_periods_in_words(varied.at(span.last), models)
-    tried = tuple(trials.tried[value] for value in sorted(trials.tried))
+    metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
+    tried = trials.measuring(metric)
     return Limit(
         of=of, unit=span.unit, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else bound_of(varied.system, metric),

@@ -219,16 +219,25 @@ def with_available_objectives(system: System, signals: set[str], numbers: set[st
             raise UsageError(f"objectives.{name}: that name has another meaning in expressions, expected another")
         if name in system.optional and not valid.issuperset(names(parse(text))):
             continue
-        expect_names(parse(text), valid, f"objectives.{name}")
+        _expect_known(parse(text), valid, f"objectives.{name}", system)
         expect_number(parse(text), courses, f"objectives.{name}")
         available[name] = text
         valid.add(name)
     for place, expression in (("good", system.criterion.good), ("diverged", system.criterion.diverged)):
         if expression is not None:
-            expect_names(parse(expression), valid, f"criterion.{place}")
+            _expect_known(parse(expression), valid, f"criterion.{place}", system)
     if system.criterion.good is not None:
         expect_number(parse(system.criterion.good), courses, "criterion.good")
     return system if len(available) == len(system.objectives) else replace(system, objectives=available)
+
+
+def _expect_known(node: Node, valid: set[str], place: str, system: System) -> None:
+    """Raise `UsageError` as `expect_names`; for an input that a source feeds it names the source's signal."""
+    fed = {end: x for key, one in system.sources.items() for end, x in zip(one.to, one.signals(key))}
+    for name in names(node):
+        if name not in valid and name in fed:
+            raise UsageError(f"{place}: {name} is no signal of a run: expected {fed[name]}, the source that feeds it")
+    expect_names(node, valid, place)
 
 
 def _ends(
@@ -286,13 +295,22 @@ def judged_objective(system: System) -> str | None:
 
 
 def bound_of(system: System, metric: str) -> float | None:
-    """The bound of a criterion that is only `metric < number`, or another comparison; None for any other."""
+    """The bound of a criterion, or of a part that `and` joins, that is only `metric < number`, or alike; else None."""
     if system.criterion.good is None:
         return None
-    match parse(system.criterion.good):
-        case Operation(operation, (Name(name), Number(bound))) if name == metric and operation in _HOLDS:
-            return bound
+    for part in _parts(parse(system.criterion.good)):
+        match part:
+            case Operation(operation, (Name(name), Number(bound))) if name == metric and operation in _HOLDS:
+                return bound
     return None
+
+
+def missed_objective(system: System, metrics: Mapping[str, Any]) -> str | None:
+    """The first objective of which a run that did not diverge misses a bound; None: there is none."""
+    if unmet(system, metrics, {}) is None or system.criterion.good is None:
+        return None
+    parts = _parts(parse(system.criterion.good))
+    return next((names(part)[0] for part in parts if _missed(part, metrics, {})), None)
 
 
 def unmet(system: System, metrics: Mapping[str, Any], units: Mapping[str, str]) -> str | None:

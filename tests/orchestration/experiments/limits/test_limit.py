@@ -33,7 +33,7 @@ from orchestration.quadrotor.scenarios.wiring import COMMAND
 from orchestration.simulation.requests.ranges import Varied, search_range
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import lowest
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
 from quadcosim import Result, Scenario, Timing, UsageError
@@ -505,6 +505,15 @@ def test_the_large_signal_limit_is_the_last_good_value_to_the_tolerance(toleranc
     assert found.tolerance == (tolerance or 0.0005)
     assert found.large_signal_limit is not None
     assert 0.0317 - found.tolerance <= found.large_signal_limit < 0.0317
+
+
+@pytest.mark.usefixtures("stubbed")
+def test_of_two_objectives_the_one_is_shown_whose_bound_is_missed_first() -> None:
+    judged = Criterion(good="settling_time < 5 and ultimate_bound < 0.05")
+    system = dataclasses.replace(scenario_of().as_system(), criterion=judged)
+    found = limits.limit(system, "components.controller.sampling.period", first=0.01, last=0.05)
+    assert (found.judged, found.judged_bound) == ("ultimate_bound", 0.05)
+    assert {one.measured for one in found.tried} == {0.01, 1.0}
 
 
 def test_only_the_quantity_varies(stubbed: type[StubPool]) -> None:
