@@ -131,7 +131,7 @@ class WrapFile:
             _expect_period("period", self.period)
         if self.tasks and self.period is not None and self.period != self.shortest_period:
             raise UsageError(f"period = {self.period}: expected {self.shortest_period:g}, that of all tasks together")
-        taken: dict[str, str] = {}
+        taken = dict.fromkeys((task.name for task in self.tasks), "tasks, which are clocks in FMI 3.0")
         for kind, name, variable in self.variables():
             if name in taken:
                 raise UsageError(f"{kind}.{name}: expected another name than one of the {taken[name]}")
@@ -279,8 +279,6 @@ def build(
     is missing here.
     """
     content = json.dumps({**description_of(path), "in_double": in_double, **({"sanitize": True} if sanitize else {})})
-    if version == 3:
-        _expect_names_of_clocks(path)
     done = subprocess.run(
         subprocesses.command("fmu_kit.compiler.pack.wrapping", out.resolve(), version, systems or ""),
         input=content, capture_output=True, text=True, errors="replace", env=subprocesses.environment(), check=False,
@@ -296,15 +294,6 @@ def build(
     if said:
         raise UsageError(str(path.parent / said))
     return out
-
-
-def _expect_names_of_clocks(path: Path) -> None:
-    """Raise `UsageError` for a variable with the name of a task, which is a clock of FMI 3.0."""
-    file = load(path)
-    tasks = {task.name for task in file.tasks}
-    for kind, name, _ in file.variables():
-        if name in tasks:
-            raise UsageError(f"{path}: {kind}.{name}: expected another name than that of a task, a clock in FMI 3.0")
 
 
 def _parsed(path: Path, text: str) -> WrapFile:
