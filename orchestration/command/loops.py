@@ -30,7 +30,10 @@ def bode(
     *,
     flags: FlightFlags,
 ) -> CommandResult:
-    """Compute gain, phase and delay margins of each command's loop, sampled, held and delayed as it is; draw them."""
+    """Compute gain, phase and delay margins of each command's loop, sampled, held and delayed as it is; draw them.
+
+    A negative phase margin belongs to a stable loop, too: one that a lead of the phase, and no lag, makes unstable.
+    """
     from orchestration.theory.stability.frequency import bode as response_of
 
     found = response_of(request_from(scenario, flags, timing), component)

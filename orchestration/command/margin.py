@@ -132,7 +132,10 @@ def _of_hover(request: "Request") -> CommandResult:
     from orchestration.systems.system.request import system_of
 
     if not isinstance(request, Scenario):
-        raise UsageError("margin: expected a scenario of the quadrotor, or --of PATH, as connections.NAME.delay_jitter")
+        raise UsageError(
+            "margin: expected a scenario of the quadrotor, or --of PATH, as connections.NAME.delay_jitter; the margins "
+            "of gain, phase and a constant delay are those of quadcosim bode"
+        )
     found = isolated_call(files_of(system_of(request)).fmus.values(), margin_of, request)
     document, lines = dataclasses.asdict(found), []
     for name, value in ((name, value) for name, value in document.items() if name != "in_double"):  # the verdict has it

@@ -23,6 +23,8 @@ PIECES = 60
 """Pieces of the busiest processor or link, as many as can be told apart"""
 BAR, LATE = 0.62, 0.16
 """Heights in a row of bars for running and for waiting"""
+VISIBLE = 1e-3
+"""Share of the window from which a bar is seen, and explained"""
 COLORS = (BLUE, GREEN, ORANGE, PURPLE, SKY, BROWN)
 """Colours of tasks and messages; a context switch is grey, a missed deadline or an error red"""
 
@@ -50,7 +52,7 @@ def draw(timeline: timeline.Timeline, style: Style, window: Window | None = None
     """A panel for each processor and link with a row for each task and message; `window` [s]: default of the timeline.
 
     A bar is execution, a thin one waiting since the release; switches are grey. An arrow is a release, a short stroke
-    a deadline, a red one a missed deadline.
+    at the foot of the bar a deadline, a red one a missed deadline.
     """
     shown = window or default_window(timeline)
     panels = {name: rows for name, rows in _panels(timeline).items() if rows}
@@ -67,7 +69,7 @@ def draw(timeline: timeline.Timeline, style: Style, window: Window | None = None
         panel.tick_params(axis="y", length=0)
         panel.grid(axis="y", visible=False)
     axes[-1, 0].set_xlabel(time.title)
-    figure.legend(handles=_legend(panels), loc="outside lower center", ncols=7 if style.is_wide else 3)
+    figure.legend(handles=_legend(panels, shown), loc="outside lower center", ncols=7 if style.is_wide else 3)
     return figure
 
 
@@ -110,7 +112,7 @@ def _draw_row(axes: Axes, row: _Row, place: int, shown: Window, factor: float, s
     due = of.deadline[(of.deadline >= first) & (of.deadline <= last)]
     missed = np.isin(due, of.deadline[of.missed])
     for which, color in ((~missed, BLACK), (missed, RED)):
-        axes.vlines(due[which] * scale, place - BAR / 2, place + BAR / 2 + 0.08, colors=color, linewidth=style.line)
+        axes.vlines(due[which] * scale, place + BAR / 4, place + BAR / 2 + 0.12, colors=color, linewidth=style.line)
 
 
 def _released(of: timeline.Jobs | timeline.Frames) -> Integers:
@@ -134,8 +136,8 @@ def _kinds(color: str) -> Mapping[int, dict[str, Any]]:
     }
 
 
-def _legend(panels: Mapping[str, list[_Row]]) -> list[Line2D | Patch]:
-    return [*_common_entries(), *_optional_entries(panels)]
+def _legend(panels: Mapping[str, list[_Row]], shown: Window) -> list[Line2D | Patch]:
+    return [*_common_entries(), *_optional_entries(panels, shown)]
 
 
 def _common_entries() -> Iterator[Line2D | Patch]:
@@ -145,11 +147,17 @@ def _common_entries() -> Iterator[Line2D | Patch]:
     yield Line2D([], [], color=BLACK, marker="|", linestyle="", label="deadline")
 
 
-def _optional_entries(panels: Mapping[str, list[_Row]]) -> Iterator[Line2D | Patch]:
+def _optional_entries(panels: Mapping[str, list[_Row]], shown: Window) -> Iterator[Line2D | Patch]:
+    first, last = shown[0] * NANOSECONDS, shown[1] * NANOSECONDS
+    least = VISIBLE * (last - first)
     rows = [row for of_panel in panels.values() for row in of_panel]
     if any(row.of.missed.any() for row in rows):
         yield Line2D([], [], color=RED, marker="|", linestyle="", label="missed")
-    kinds = {int(kind) for row in rows for kind in np.unique(row.slices.kind)}
+    kinds = {
+        int(kind)
+        for slices in (row.slices for row in rows)
+        for kind in slices.kind[(slices.begin <= last) & (slices.end >= first) & (slices.end - slices.begin >= least)]
+    }
     if timeline.SWITCH in kinds:
         yield Patch(facecolor=GREY, label="switch")
     if timeline.CORRUPTED in kinds:

@@ -47,15 +47,16 @@ LOOPS: Registry[KnownLoop] = Registry()
 """filled by the rooms above"""
 
 
-def rested(request: Request) -> System:
+def rested(request: Request, *, checked: bool = True) -> System:
     """The system that a request means, as one that is at rest at its operating point.
 
-    Raises `UsageError` for one that a run refuses, too, be it for an objective.
+    Raises `UsageError` for one that a run refuses, too, be it for an objective; unless `checked`, which builds FMUs.
     """
     known = LOOPS.of(request.kind)
     if known is not None:
         return known.at_rest(request)
-    from orchestration.simulation.engines.resolved import resolve  # not before: loads the engines
+    if checked:
+        from orchestration.simulation.engines.resolved import resolve  # not before: loads the engines
 
-    resolve(request)
+        resolve(request)
     return request.as_system()

@@ -136,11 +136,16 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
             for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))
             if end is not None
         ):
-            return found
+            return replace(found, limit=_as_accurate(found.limit, found), lower=_as_accurate(found.lower, found))
     return LinearLimit(
         reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
         "precision, or that switches"
     )
+
+
+def _as_accurate(end: float | None, found: LinearLimit) -> float | None:
+    """An end without the digits that its accuracy does not bear."""
+    return end if end is None or not found.accuracy else round(end, -math.floor(math.log10(found.accuracy)))
 
 
 def _near(end: float, span: Range) -> tuple[float, float]:

@@ -89,6 +89,9 @@ def test_a_chart_shows_no_more_than_can_be_told_apart(file: Path) -> None:
     end = gantt.default_window(timeline)[1]
     assert max((each.begin < end * 1e9).sum() for each in timeline.processors.values()) == gantt.PIECES
     assert gantt.default_window(schedule(file, 0.01).timeline) == (0.0, 0.01)
+    with SCREEN.applied():
+        shown = gantt.draw(schedule(file, 0.1).timeline, SCREEN, (0.0, 10.0)).legends[0].get_texts()
+    assert "switch" not in [text.get_text() for text in shown]  # too short to be seen there
 
 
 def test_a_chart_has_a_panel_for_each_processor_and_link_and_bars_as_long_as_they_run(file: Path) -> None:

@@ -207,6 +207,7 @@ def test_where_an_fmu_saves_no_state_twin_runs_are_used_and_it_is_said(
     found = local_limits(varied, Range(first=1.9, step=0.1, last=2.1, tolerance=0.1))
     assert found.limit == pytest.approx(2.0, abs=0.02)
     assert found.accuracy == pytest.approx(0.02)
+    assert found.limit == round(found.limit or 0.0, 2)
     assert found.method == f"{TWINS}, as saved states do not suffice: the FMU of controller cannot save its state"
 
 
