@@ -297,12 +297,14 @@ def test_whether_a_call_hangs_is_told_by_the_time_of_the_process(
     def out_of_time(child: Child, hear: Callable[[Frame], None]) -> Ending:
         hear(("begin", "runs"))
         hear(("beat", 0.5))
+        hear(("crashed", "law.c:7 (loop)"))
         return Ending(code=None, reached="it is late", out_of_time=True)
 
     monkeypatch.setattr(Child, "spent", property(lambda child: next(times)))
     monkeypatch.setattr(Child, "receive_all", out_of_time)
     (found,) = validate(low_pass, limits=Limits(time=60.0))
-    assert found.text == f"stopped in runs, after t = 0.5 s: it is late; {words}; the rest was not checked"
+    place = "in runs, after t = 0.5 s, at law.c:7 (loop)"
+    assert found.text == f"stopped {place}: it is late; {words}; the rest was not checked"
 
 
 def test_the_child_reports_an_error_in_a_rule(low_pass: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -209,6 +209,10 @@ def test_of_frames_before_the_command_the_jitter_is_certified(monkeypatch: pytes
     up_to = check_certificate(found.save(tmp_path / "certificate.json"), on_a_bus()).up_to
     assert up_to is not None
     assert found.certified <= up_to < found.largest  # as no other value would make the command later
+    monkeypatch.setattr(certificates, "MOST_STATES", 1)
+    found = margin(on_a_bus(), "networks.bus.messages.status.jitter")
+    assert found.certified is None
+    assert "no proof sought: " in found.verdict
 
 
 def test_a_loop_that_constant_execution_times_break_has_none() -> None:

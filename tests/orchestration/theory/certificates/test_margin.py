@@ -118,6 +118,9 @@ def test_of_a_loop_too_large_for_a_proof_only_what_breaks_it_is_sought(
     assert found.certified is None
     assert found.breaking == 1
     assert "no proof sought: 3 states act on one another" in found.verdict
+    late = margin(system, COMMAND, last=0.01)
+    assert (late.certified, late.breaking) == (None, None)
+    assert "no proof sought: 3 states act on one another" in late.verdict
     with pytest.raises(UsageError, match="no proof is sought: 2 states"):
         margin_region(system, COMMAND, SAMPLE)
 
