@@ -7,6 +7,7 @@ import logging
 import numbers
 import re
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -164,6 +165,7 @@ def _cluster(stack: ExitStack, inputs: Inputs, address: str) -> _Cluster:
     """The scheduler at an address, left with `stack`; raises `QuadcosimError` if it is not reached."""
     import asyncio
 
+    import dask
     import distributed
 
     # The TimeoutErrors are distinct before Python 3.11.
@@ -177,8 +179,7 @@ def _cluster(stack: ExitStack, inputs: Inputs, address: str) -> _Cluster:
 
     async def begin() -> Any:
         await client.wait_for_workers(1, timeout=_WORKERS_PATIENCE)
-        # Files are sent once, identified by the hash of their content.
-        return await client.scatter(inputs, broadcast=True, hash=True), await client.scheduler.ncores()
+        return await client.scheduler.ncores()
 
     def ask(question: Callable[[], Any]) -> "Future[Any]":
         return asyncio.run_coroutine_threadsafe(question(), client.loop.asyncio_loop)
@@ -188,14 +189,17 @@ def _cluster(stack: ExitStack, inputs: Inputs, address: str) -> _Cluster:
     try:
         while not concurrent.futures.wait([begun], timeout=_POLL).done:
             heartbeat.check()
-        scattered, threads = begun.result()
+        threads = begun.result()
     except unreachable as error:
         raise _unreachable(address, error) from error
+    # Files are sent once, as a task: scattered data are lost with the worker that holds them, a task is done again.
+    with dask.config.set({"distributed.admin.large-graph-warning-threshold": sys.maxsize}):
+        held = client.submit(held_on_cluster, inputs, key=f"Inputs-{inputs.digest}")
     executor = client.get_executor(pure=False)
     stack.callback(executor.shutdown, wait=False)
 
     def submit(task: RunTask | TaskBatch) -> "Future[Results]":
-        return executor.submit(run_on_cluster, task, scattered)  # type: ignore[no-any-return]
+        return executor.submit(run_on_cluster, task, held)  # type: ignore[no-any-return]
 
     return _Cluster(submit=submit, check=heartbeat.check, threads=max(1, sum(threads.values())))
 
@@ -283,6 +287,11 @@ def expect_scheduler(address: str) -> None:
         socket.create_connection((match[1].strip("[]"), int(match[2])), timeout=_PATIENCE).close()
     except OSError as error:
         raise _unreachable(address, error) from error
+
+
+def held_on_cluster(inputs: Inputs) -> Inputs:
+    """The inputs themselves; called in a dask worker, which then holds them for the others."""
+    return inputs
 
 
 def run_on_cluster(task: RunTask | TaskBatch, inputs: Inputs) -> Results:

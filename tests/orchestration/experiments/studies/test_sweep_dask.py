@@ -37,6 +37,7 @@ from tests.orchestration.experiments.studies.common import (
     study,
     sweep,
     wait_for_rows,
+    wait_until,
 )
 from tests.orchestration.experiments.studies.test_sweep_hostile import expect_its_own_runs_to_fail, hostile
 from tests.patience import PATIENCE
@@ -107,6 +108,26 @@ def test_searches_evaluate_their_runs_on_a_cluster_too(cluster: Cluster) -> None
         with RunEvaluator(files, 1, dask=dask) as pool:
             found.append(pool.run_all(systems))
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_the_inputs_outlive_the_worker_that_holds_them(others: int) -> None:
+    """With another worker, or with one that joins later."""
+    import distributed
+
+    systems = [short().as_system()]
+    one: dict[str, Any] = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "protocol": "tcp"}
+    with (
+        distributed.LocalCluster(host="127.0.0.1", dashboard_address="127.0.0.1:0", **one) as local,
+        RunEvaluator(files_of(systems[0]), 1, dask=local.scheduler_address) as pool,
+    ):
+        before = pool.run_all(systems)
+        (holder,) = local.scheduler.workers
+        local.scale(1 + others)
+        wait_until(lambda: len(local.scheduler.workers) == 1 + others)
+        local.sync(local.scheduler.remove_worker, holder, stimulus_id="killed")
+        local.scale(2)
+        assert pool.run_all(systems) == before
 
 
 @in_test_all
