@@ -59,6 +59,7 @@ def test_an_episode_is_a_run_of_its_seed_and_start(environment: Any) -> None:
     assert [*info["values"]] == [X, "seed"]
     start = quadcosim.fly(SHORT, info["values"], outputs=[], record=["plant.position"])
     assert start["plant.position.x"][0] == info["values"][X], "what was drawn, which fly takes"
+    assert environment.reset(seed=3, options={X: 0.25})[1]["values"] == {**info["values"], X: 0.25}
     other, _ = environment.reset()
     assert first.tobytes() == again.tobytes() != other.tobytes()
     rewards, over = [], False
