@@ -9,6 +9,7 @@ from orchestration.experiments.studies.axes import name_of, quantity_of
 from orchestration.experiments.studies.shares import (
     BOOLEAN,
     GOOD,
+    WITH_VALUE,
     differences_of,
     differences_of_medians,
     judged_by,
@@ -16,6 +17,7 @@ from orchestration.experiments.studies.shares import (
     medians_of,
     shares_of,
     with_chance,
+    without_value,
 )
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.table import OF_CELLS, expect_metric_of_cells, frame, units_in
@@ -56,10 +58,12 @@ def study_table(study: Study, store: Path, metric: str = GOOD) -> PrintedTable:
         texts = partial(_texts, column="share", decimals=decimals_of(cells["count"].max()))
         caption = f"Share of {word} runs of {cells['count'].max()} in each cell, with 95 % Wilson intervals"
     else:
-        texts = partial(_medians, column="median", count="good")
+        texts = partial(_medians, column="median", count=WITH_VALUE)
         title = labels.metric_with_unit(metric, units.get(metric))
         caption = f"Median of {title} over the {word} runs of each cell, with 95 % intervals of order statistics"
         caption += " and, in parentheses, their number"
+        if left_out := without_value(cells):
+            caption += f"; {left_out}"
     if laws is None:
         columns[f"share {word}" if is_share else "median"] = texts(cells)
     else:
@@ -96,11 +100,13 @@ def _texts(table: "pd.DataFrame", column: str, decimals: int) -> list[str]:
 
 
 def _medians(table: "pd.DataFrame", column: str, count: str) -> list[str]:
-    """Medians with their intervals and the number of runs; a dash where there are none."""
-    rows = zip(*(table[name] for name in (column, "low", "high", count)))
+    """Medians with their intervals and the number of runs, of all good ones if some have none; a dash for none."""
+    rows = zip(*(table[name] for name in (column, "low", "high", count, GOOD if count == WITH_VALUE else count)))
     return [
-        f"{to_digits(value, low, high, DIGITS)} ({number:.0f})" if number > 0 else "-"
-        for value, low, high, number in rows
+        f"{to_digits(value, low, high, DIGITS)} ({number:.0f}{f' of {good:.0f}' if number < good else ''})"
+        if good > 0
+        else "-"
+        for value, low, high, number, good in rows
     ]
 
 

@@ -202,7 +202,7 @@ def tables_of_maps(
 ) -> "Iterator[tuple[tuple[str, str], str, pd.DataFrame]]":
     """The finished runs over both axes: a vehicle and a condition of the file, a fate, and which runs have it.
 
-    `table` is one `with_second_axis`; those here are such as `cells_of` reads, with pairs of equal initial conditions.
+    `table` is one `with_second_axis`; those here are such as `shares_of` reads, with pairs of equal initial conditions.
     """
     stands_for = {name: one.condition for name, one in comparison.on_second.items()}
     done = table[table["status"] == "done"]

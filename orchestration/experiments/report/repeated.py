@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.report.model import CellMap, MapCell, RepeatedMaps
 from orchestration.experiments.report.tables import ColumnAxis, Row
-from orchestration.experiments.studies.shares import TwoLaws, cells_of, differences_of, laws_of, with_chance
+from orchestration.experiments.studies.shares import TwoLaws, differences_of, laws_of, shares_of, with_chance
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.requirements import is_number
@@ -106,7 +106,7 @@ def maps_of_both(first: tuple[str, RunsInCells | None], second: tuple[str, RunsI
 
 def share_maps(runs: RunsInCells, title: str, *, is_other: bool = False) -> list[CellMap]:
     """The shares of good runs in the cells, a map for each law; whether they are those of a second study."""
-    none, found = runs.table[:0], cells_of(runs.table, runs.by)
+    none, found = runs.table[:0], shares_of(runs.table, runs.by)
     return _maps(runs, found, title, *((none, runs.table) if is_other else (runs.table, none)))
 
 

@@ -15,11 +15,13 @@ from matplotlib.patheffects import withStroke
 from orchestration.experiments.studies.axes import SCALES, Axis, name_of, quantity_of
 from orchestration.experiments.studies.shares import (
     GOOD,
+    WITH_VALUE,
     TwoLaws,
-    cells_of,
     differences_of,
     differences_of_medians,
     medians_of,
+    shares_of,
+    without_value,
 )
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
@@ -61,18 +63,19 @@ def cell_lines(
     figure = style.figure(32.0)
     panel = figure.add_subplot()
     names = _names(axis, laws)
-    found = cells_of(table, names)
-    shown = found if metric == GOOD else medians_of(table, names, metric).rename(columns={"median": "value"})
+    found = shares_of(table, names)
+    shown = found if metric == GOOD else medians_of(table, names, metric)
+    column = "share" if metric == GOOD else "median"
     groups = _by_value(shown, laws, units)
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
-        panel.plot(at, group["value"], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
+        panel.plot(at, group[column], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
         if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
-            ends = np.abs(group[["low", "high"]].to_numpy().T - group["value"].to_numpy())
-            panel.errorbar(at, group["value"], ends, fmt="none", ecolor=how["color"], elinewidth=0.8, capsize=2.5)
-            known = group[group["good"] > 0]
-            for place, value, count in zip(across.of(known[axis.name]), known["value"], known["good"]):
+            ends = np.abs(group[["low", "high"]].to_numpy().T - group[column].to_numpy())
+            panel.errorbar(at, group[column], ends, fmt="none", ecolor=how["color"], elinewidth=0.8, capsize=2.5)
+            known = group[group[WITH_VALUE] > 0]
+            for place, value, count in zip(across.of(known[axis.name]), known[column], known[WITH_VALUE]):
                 panel.annotate(
                     f"{count}", (place, value), (3.0, -3.0), textcoords="offset points", va="top", fontsize="x-small",
                     color=how["color"], path_effects=[withStroke(linewidth=1.5, foreground="white")],
@@ -89,9 +92,10 @@ def cell_lines(
     if laws is not None:
         place = "outside right upper" if style.is_wide else "outside lower center"
         figure.legend(loc=place, title=name_of(laws), ncols=1 if style.is_wide else len(groups))
-    title = _repetitions(found, metric)
-    bars = "; bars: 95 % intervals of order statistics, where runs suffice" if title and metric != GOOD else ""
-    style.set_title(figure, title + bars)
+    said = [_repetitions(found, metric)]
+    if said[0] and metric != GOOD:
+        said += ["bars: 95 % intervals of order statistics, where runs suffice", without_value(shown)]
+    style.set_title(figure, "; ".join(filter(None, said)))
     return figure
 
 
@@ -113,7 +117,11 @@ def cell_maps(
     """
     x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
     places = (x.edges, y.edges)
-    found = cells_of(table, _names(*axes, third), metric)
+    found = shares_of(table, _names(*axes, third))
+    found["value"], left_out = found["share"], ""
+    if metric != GOOD:
+        medians = medians_of(table, _names(*axes, third), metric)  # the rows are the same, in the same order
+        found["value"], found[WITH_VALUE], left_out = medians["median"], medians[WITH_VALUE], without_value(medians)
     groups = _by_value(found, third, units)
     both = _two_laws(third)
     count = len(groups) + (both is not None)
@@ -137,7 +145,7 @@ def cell_maps(
         if metric == GOOD and writes:
             _write_counts(panel, (x, y), axes, group, OF_ALL if has_room[OF_ALL] else ALONE)
         elif writes and repeats:
-            _write_numbers(panel, (x, y), axes, group[group["good"] > 0].set_index(_names(*axes))["good"], 0.0)
+            _write_numbers(panel, (x, y), axes, group[group[WITH_VALUE] > 0].set_index(_names(*axes))[WITH_VALUE], 0.0)
         panel.set_title(law or "")
     empty = [np.where(np.isnan(grid["value"]) & ~np.isnan(grid["share"]), 0.0, np.nan) for grid in grids]
     for panel, none_good in zip(panels, empty):
@@ -169,15 +177,15 @@ def cell_maps(
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
     excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
-    dots = f"; dots: {excludes} excludes 0" if both is not None else ""
-    repetitions = _repetitions(found, metric)
-    style.set_title(figure, repetitions and repetitions + dots)
+    said = [_repetitions(found, metric), f"dots: {excludes} excludes 0" if both is not None else "", left_out]
+    style.set_title(figure, "; ".join(filter(None, said)) if said[0] or left_out else "")
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):
         label = f"{'half of the runs' if repeats else 'limit of what is'} {words[0]}"
         handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=label))
     if np.isfinite(np.stack(empty)).any():
-        handles.append(Patch(color=NOT_GOOD, label=f"{'none' if repeats else 'not'} {words[0]}"))
+        word = f"{'none' if repeats else 'not'} {words[0]}"
+        handles.append(Patch(color=NOT_GOOD, label=f"{word}, or no value" if left_out else word))
     if any(np.isnan(grid["share"]).any() for grid in grids):
         handles.append(mesh.hatched())
     if handles:

@@ -17,6 +17,8 @@ GOOD = "good"
 """Column of a table of runs: whether a run meets the criterion"""
 BOOLEAN = (GOOD, "diverged")
 """Metrics of which cells have the share of the runs, of all, for which they are true; of others medians"""
+WITH_VALUE = "with_value"
+"""Column of medians: the number of good runs that have the metric, as those that settle have a settling time"""
 RANDOM = "random"
 """Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
 PAIR = "paired by"
@@ -44,28 +46,22 @@ def judged_by(table: "pd.DataFrame", metric: str) -> "pd.DataFrame":
     return table.assign(**{GOOD: table[metric]})
 
 
-def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "pd.DataFrame":
-    """A row for each combination of the values of the axes `by` that has finished runs.
+def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
+    """A row for each combination of the values of the axes `by` that has finished runs, in their order.
 
-    The table is one `with_chance`. Columns: those axes, `count` of runs, `good` of them, `share`, its Wilson interval
-    at 95 % `low` and `high`, and `value`: the share, or the median of another `metric` over the good runs, nan if there
-    are none. A cell where nothing is random is one run, whatever its seeds, and its interval is nan. Raises
-    `UsageError` if no criterion says what is good.
+    The table is one `with_chance`. Columns: those axes, `count` of runs, `good` of them, `share`, and its Wilson
+    interval at 95 % `low` and `high`. A cell where nothing is random is one run, whatever its seeds, and its interval
+    is nan. Raises `UsageError` if no criterion says what is good.
     """
     import pandas as pd
 
     done = table[table["status"] == "done"]
     if done["good"].isna().any():
         raise UsageError("expected criterion.good in the base, which says what a good run is")
-    good = done["good"].astype(bool)
-    counted = done.assign(count=1, good=good.astype(int), value=np.nan if metric == GOOD else done[metric].where(good))
-    cells = counted.groupby([*by], sort=True).agg(
-        count=("count", "sum"), good=("good", "sum"), value=("value", "median"), random=(RANDOM, "any")
-    )
+    counted = done.assign(count=1, good=done["good"].astype(int))
+    cells = counted.groupby([*by], sort=False).agg(count=("count", "sum"), good=("good", "sum"), random=(RANDOM, "any"))
     cells = cells.reset_index()
     cells["share"] = cells["good"] / cells["count"]
-    if metric == GOOD:
-        cells["value"] = cells["share"]
     intervals = [
         wilson(int(good), int(count)) if random else (np.nan, np.nan)
         for good, count, random in zip(cells["good"], cells["count"], cells["random"])
@@ -73,12 +69,7 @@ def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str = GOOD) -> "p
     alike = ~cells["random"] & cells["share"].isin((0.0, 1.0))  # one flight, whatever its seeds
     cells.loc[alike, "good"], cells.loc[alike, "count"] = cells.loc[alike, "share"].astype(int), 1
     cells[["low", "high"]] = pd.DataFrame(intervals, index=cells.index, columns=["low", "high"], dtype=float)
-    return cells[[*by, "count", "good", "share", "low", "high", "value"]]
-
-
-def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
-    """The cells without a metric: axes, `count`, `good`, `share`, `low`, `high`; raises `UsageError` likewise."""
-    return cells_of(table, by).drop(columns="value")
+    return cells[[*by, "count", "good", "share", "low", "high"]]
 
 
 def interval_of_difference(
@@ -144,17 +135,25 @@ def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "
 def medians_of(table: "pd.DataFrame", by: Sequence[str], metric: str) -> "pd.DataFrame":
     """The median of a metric over the good runs of each cell.
 
-    Columns: the axes `by`, `good`, the number of those runs, `median`, and the interval of order statistics at 95 %,
-    `low` and `high`, nan where there are too few runs, and where nothing is random, which is one run.
+    Columns: the axes `by`, `good`, the number of those runs, `with_value`, of those that have the metric, `median`, and
+    the interval of order statistics at 95 %, `low` and `high`, nan where there are too few runs, and where nothing is
+    random, which is one run.
     """
     import pandas as pd
 
     done = table[table["status"] == "done"]
     rows = []
-    for key, cell in done.groupby([*by]):
-        good = cell.loc[cell["good"].fillna(False).astype(bool) & cell[metric].notna(), metric]
-        rows.append((*key, *_median(good, is_random=bool(cell[RANDOM].any()))))
-    return pd.DataFrame(rows, columns=[*by, "good", "median", "low", "high"])
+    for key, cell in done.groupby([*by], sort=False):
+        values, is_random = cell.loc[cell["good"].fillna(False).astype(bool), metric], bool(cell[RANDOM].any())
+        good = len(values) if is_random else min(1, len(values))
+        rows.append((*key, good, *_median(values.dropna(), is_random=is_random)))
+    return pd.DataFrame(rows, columns=[*by, "good", WITH_VALUE, "median", "low", "high"])
+
+
+def without_value(medians: "pd.DataFrame") -> str:
+    """What a caption says of good runs that lack the metric, with their number; empty without such runs."""
+    missing = int((medians["good"] - medians[WITH_VALUE]).sum())
+    return f"{missing} good run{'s' if missing > 1 else ''} without a value left out" if missing else ""
 
 
 def _median(values: "pd.Series", *, is_random: bool) -> tuple[int, float, float, float]:
@@ -169,8 +168,9 @@ def _median(values: "pd.Series", *, is_random: bool) -> tuple[int, float, float,
 def differences_of_medians(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws, metric: str) -> "pd.DataFrame":
     """The median of a metric of the second law minus that of the first, over the pairs in which both are good.
 
-    Columns: the other axes, `pairs`, their number, `difference`, and the interval of order statistics at 95 %, `low`
-    and `high`, nan where there are too few pairs, and where nothing is random, which is one pair.
+    Columns: the other axes, `pairs`, the number of those in which both have the metric, `difference`, and the interval
+    of order statistics at 95 %, `low` and `high`, nan where there are too few pairs, and where nothing is random, which
+    is one pair.
     """
     import pandas as pd
 
@@ -178,7 +178,7 @@ def differences_of_medians(table: "pd.DataFrame", by: Sequence[str], laws: TwoLa
     good = table[(table["status"] == "done") & table["good"].fillna(False).astype(bool) & table[metric].notna()]
     columns, rows = [*others, PAIR, metric, RANDOM], []
     one, other = (good.loc[good[laws.axis] == law, columns] for law in (laws.second, laws.first))
-    for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others):
+    for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others, sort=False):
         is_random = bool((both[RANDOM] | both[f"{RANDOM}.other"]).any())
         rows.append((*key, *_median(both[metric] - both[f"{metric}.other"], is_random=is_random)))
     return pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high"])

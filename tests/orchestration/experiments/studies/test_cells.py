@@ -18,12 +18,12 @@ from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
     PAIR,
     TwoLaws,
-    cells_of,
     differences_of,
     differences_of_medians,
     interval_of_difference,
     judged_by,
     medians_of,
+    shares_of,
     with_chance,
 )
 from orchestration.experiments.studies.study import Study
@@ -60,7 +60,7 @@ def runs() -> pd.DataFrame:
 
 
 def test_a_cell_is_the_share_of_its_good_runs_with_wilsons_interval() -> None:
-    cells = cells_of(runs(), ["controller", "timing.period", "timing.loss"])
+    cells = shares_of(runs(), ["controller", "timing.period", "timing.loss"])
     assert cells["count"].eq(SEEDS).all()
     cell = cells.query("controller == 'CascadedController' and `timing.period` == 0.01 and `timing.loss` == 0.1").iloc[
         0
@@ -71,24 +71,43 @@ def test_a_cell_is_the_share_of_its_good_runs_with_wilsons_interval() -> None:
 
 def test_a_metric_that_is_true_or_false_has_its_share_of_all_runs() -> None:
     diverged = judged_by(runs().assign(diverged=lambda table: ~table["good"]), "diverged")
-    cells = cells_of(diverged, ["controller", "timing.period"]).set_index(["controller", "timing.period"])
-    assert cells["share"].tolist() == [15 / 24, 1.0, 0.0, 0.0]
+    cells = shares_of(diverged, ["controller", "timing.period"]).set_index(["controller", "timing.period"])
+    assert cells["share"].tolist() == [0.0, 0.0, 15 / 24, 1.0]
 
 
 def test_a_metric_of_a_cell_is_its_median_over_the_good_runs_and_failed_runs_do_not_count() -> None:
     table = runs()
     table.loc[0, ["status", "good"]] = ["failed", pd.NA]
-    cells = cells_of(table, ["controller", "timing.period", "timing.loss"], "position_rmse").set_index(
+    cells = medians_of(table, ["controller", "timing.period", "timing.loss"], "position_rmse").set_index(
         ["controller", "timing.period", "timing.loss"]
     )
-    assert cells.loc[("CascadedController", 0.01, 0.1), "value"] == 2.0
-    assert np.isnan(cells.loc[("CascadedController", 0.02, 0.1), "value"])
-    assert cells.loc[("UnifiedController", 0.01, 0.0), "count"] == SEEDS - 1
+    assert cells.loc[("CascadedController", 0.01, 0.1), "median"] == 2.0
+    assert np.isnan(cells.loc[("CascadedController", 0.02, 0.1), "median"])
+    assert cells.loc[("UnifiedController", 0.01, 0.0), "good"] == SEEDS - 1
+
+
+def test_good_runs_without_the_metric_are_left_out_and_counted_as_such_in_map_line_and_table() -> None:
+    names = ["controller", "timing.period", "timing.loss"]
+    table = runs().query("controller == 'CascadedController'")
+    lacks = (table["timing.loss"] == 0.1) | ((table["timing.loss"] == 0.2) & (table["seed"] == 5))
+    table = table.assign(position_rmse=table["position_rmse"].mask(lacks))
+    medians = medians_of(table, names, "position_rmse")
+    assert medians[["good", "with_value"]].to_numpy().tolist() == [[0, 0], [3, 0], [6, 5], [0, 0], [0, 0], [0, 0]]
+    assert study_table._medians(medians, "median", "with_value")[:3] == ["-", "- (0 of 3)", "3 (5 of 6)"]
+    one_law = axis("controller", "CascadedController")
+    figure = cell_maps(table, (PERIODS, LOSSES), one_law, "position_rmse", WORDS, units={})
+    assert [text.get_text() for text in figure.axes[0].texts] == ["5"]
+    assert figure.get_suptitle() == "8 runs a cell; 4 good runs without a value left out"
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["half of the runs settled", "none settled, or no value"]
+    figure = cell_lines(table, LOSSES, one_law, "position_rmse", WORDS, units={})
+    assert [text.get_text() for text in figure.axes[0].texts] == ["5"]
+    assert "; 4 good runs without a value" in figure.get_suptitle()
 
 
 def test_runs_that_no_criterion_judges_have_no_share() -> None:
     with pytest.raises(UsageError, match=r"expected criterion\.good in the base"):
-        cells_of(runs().assign(good=pd.NA), ["timing.period"])
+        shares_of(runs().assign(good=pd.NA), ["timing.period"])
 
 
 def share_of(good: int, count: int) -> dict[str, float]:
@@ -147,7 +166,7 @@ def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good(
     )
     assert found["low"].isna().tolist() == [True, False], "three pairs do not bound a median"
     assert tuple(found.loc[(0.01, 0.2), ["low", "high"]]) == (0.0, 25.0)
-    medians = medians_of(table, names, "position_rmse").set_index(names).loc[laws.second, 0.01]
+    medians = medians_of(table, names, "position_rmse").set_index(names).sort_index().loc[laws.second, 0.01]
     assert medians["good"].tolist() == [0, 3, 6]
     assert medians["median"].tolist() == [pytest.approx(np.nan, nan_ok=True), 6.0, 19.0]
     assert medians.loc[0.2, ["low", "high"]].tolist() == [0.0, 50.0]
@@ -167,7 +186,7 @@ def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good(
 def test_a_cell_in_which_nothing_is_random_has_no_interval_and_no_dot() -> None:
     table = runs().query("seed < 1 or `timing.loss` > 0.0")
     table = table.assign(random=table["timing.loss"] > 0.0)
-    cells = cells_of(table, ["controller", "timing.period", "timing.loss"])
+    cells = shares_of(table, ["controller", "timing.period", "timing.loss"])
     assert cells["low"].isna().tolist() == cells["timing.loss"].eq(0.0).tolist()
     figure = cell_maps(table, (PERIODS, LOSSES), LAWS, "good", WORDS, units={})
     (marks,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
@@ -264,7 +283,7 @@ def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     assert [text.get_text() for text in figure.axes[0].texts] == ["16", "16", "16", "3", "6"]
     assert figure.axes[0].get_ylabel().endswith("where settled, and their number")
     first = next(iter(figure.axes[0].collections)).get_segments()[0]  # type: ignore[attr-defined]
-    low, high = medians_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[3, ["low", "high"]]
+    low, high = medians_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[0, ["low", "high"]]
     assert first[:, 1].tolist() == [low, high], "the interval of the first place"
     assert not figure.get_suptitle()
     assert not cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=STYLES["paper"]).get_suptitle()
@@ -298,7 +317,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert "did you mean position_rmse?" in error
     main("export", "study.toml", "--format", "csv", "--metric", "position_rmse")
     medians = pd.read_csv(tmp_path / "results/study/medians_position_rmse.csv")
-    assert list(medians)[2:] == ["good", "median", "low", "high", "unit"]
+    assert list(medians)[2:] == ["good", "with_value", "median", "low", "high", "unit"]
     assert set(medians["unit"]) == {"m"}
     of_medians = pd.read_csv(tmp_path / "results/study/differences_position_rmse.csv")
     assert list(of_medians)[3:] == ["pairs", "difference", "low", "high", "unit"]
