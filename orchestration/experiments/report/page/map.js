@@ -2,6 +2,7 @@
 
 const { NOT_GOOD, SHADES: { OUTER_SHARE, OUTLIER_RATIO, MIN_RANGE, LOGARITHMIC_RATIO } } = FIGURES;
 const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
+const MARKS_OF_OTHER = { good: "diamond-open", bad: "cross-thin-open", diverged: "triangle-up-open" }; // of a second study
 const MAX_SYMBOLS = 2500;
 const VALUE = "value";
 
@@ -285,22 +286,30 @@ function heights() {
   return map.rows.map((row) => cellOf(map.metric, row)).filter(Number.isFinite);
 }
 
-function pointTraces() {
-  const bottom = heights().reduce((least, value) => Math.min(least, value), Infinity);
+/** The height of marks without a value: the least of all values. */
+function footOf(values) {
+  const foot = values.reduce((least, value) => Math.min(least, value), Infinity);
+  return Number.isFinite(foot) ? foot : 0;
+}
+
+function nameOfMarks(kind, values) {
+  const word = { good: report.words[0], bad: report.words[1], diverged: "diverged" }[kind];
+  return escaped(`${word} (${values.length}${values.some(Number.isNaN) ? "; without a value at the foot" : ""})`);
+}
+
+function pointTraces(foot = footOf(heights())) {
   return ["good", "bad", "diverged"].flatMap((kind) => {
     const rows = map.rows.filter((row) => kindOf(outcomeOf(row)) === kind);
     if (!rows.length) return [];
     const height = (row) => {
       if (map.y !== VALUE) return cellOf(map.y, row);
       const value = cellOf(map.metric, row);
-      return Number.isNaN(value) ? (Number.isFinite(bottom) ? bottom : 0) : value;
+      return Number.isNaN(value) ? foot : value;
     };
-    const word = { good: report.words[0], bad: report.words[1], diverged: "diverged" }[kind];
-    const missing = map.y === VALUE && rows.some((row) => Number.isNaN(cellOf(map.metric, row)));
     const colored = kind === "good" && map.y !== VALUE;
     const plain = { good: COLORS[0], bad: paint("bad"), diverged: COLORS[1] }[kind];
     return {
-      type: "scatter", mode: "markers", name: escaped(`${word} (${rows.length}${missing ? "; without a value at the foot" : ""})`),
+      type: "scatter", mode: "markers", name: nameOfMarks(kind, rows.map((row) => (map.y === VALUE ? cellOf(map.metric, row) : 0))),
       x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, said: (i) => hoverOf(rows[i]), faded: rows.map(isOutside),
       marker: {
         symbol: MARKS[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" ? 0 : 1.5, color: plain },

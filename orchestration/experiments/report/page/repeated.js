@@ -97,9 +97,9 @@ function openRepeated(cell) {
   drawRepeated();
   byId("cell").hidden = false;
   byId("cell-title").textContent = placeOfRepeated(cell);
-  const diamonds = cell.others.length ? ` Diamonds: runs of ${report.other.name}, which a report of that study alone opens.` : "";
-  const click = cell.runs.length ? `; click one${diamonds && ` of ${report.title}`}, or use the arrow keys, to open it` : "";
-  const hint = `Each point is a run${click}.${diamonds}`;
+  const beside = cell.others.length ? ` Those of ${report.other.name} a report of that study alone opens.` : "";
+  const click = cell.runs.length ? `; click one${beside && ` of ${report.title}`}, or use the arrow keys, to open it` : "";
+  const hint = `Each point is a run${click}.${beside}`;
   byId("cell-text").textContent = `${cell.said}. ${hint}`;
   map.rows = cell.runs.map(rowOfIndex).filter((row) => row !== undefined);
   map.x = axes.findLast((axis) => ![report.repeated.across, report.repeated.up].includes(axis.name) && !axis.words) ?? axes.at(-1);
@@ -109,25 +109,29 @@ function openRepeated(cell) {
   drawRunsOfCell().then(() => openRow(firstOf(map.rows)));
 }
 
-/** The runs of the second study in the open cell, and those of the first by its name. */
-function besideOther(own) {
+/** The runs of the open cell, and those of a second study with marks of their own. */
+function tracesOfCell() {
   const { others } = cells.open;
-  if (!others?.length) return own;
+  if (!others?.length) return pointTraces();
   const columns = new Map(report.other.table.columns.map((column) => [column.name, column]));
   const at = (name, row) => (columns.has(name) ? cellOf(columns.get(name), row) : NaN);
+  const valueOf = (row) => at(map.metric.name, row);
   const wanted = new Set(others);
   const rows = [...Array(report.other.table.count).keys()].filter((row) => wanted.has(at("design_index", row)));
-  const values = rows.map((row) => at(map.metric.name, row));
-  const foot = [...heights(), ...values.filter(Number.isFinite)].reduce((least, value) => Math.min(least, value), Infinity);
-  const said = (i) => `<b>${escaped(report.other.name)}, run ${at("design_index", rows[i])}: ${escaped(at("outcome", rows[i]))}</b><br>${escaped(map.metric.label)}: ${withUnit(values[i], escaped(map.metric.unit ?? ""))}`;
-  const name = `${escaped(report.other.name)}: ${others.length} run${others.length > 1 ? "s" : ""}`;
-  return [
-    ...own.map((trace) => ({ ...trace, name: `${escaped(report.title)}: ${trace.name}` })),
-    {
-      type: "scatter", mode: "markers", name, said, x: rows.map((row) => at(map.x.name, row)), y: values.map((value) => (Number.isFinite(value) ? value : Number.isFinite(foot) ? foot : 0)),
-      marker: { symbol: "diamond-open", size: 9, color: COLORS[2], line: { width: 1.5, color: COLORS[2] } },
-    },
-  ];
+  const foot = footOf([...heights(), ...rows.map(valueOf).filter(Number.isFinite)]);
+  const own = pointTraces(foot).map((trace) => ({ ...trace, name: `${escaped(report.title)}: ${trace.name}` }));
+  const beside = Object.entries(MARKS_OF_OTHER).flatMap(([kind, symbol]) => {
+    const those = rows.filter((row) => kindOf(at("outcome", row)) === kind);
+    if (!those.length) return [];
+    const values = those.map(valueOf);
+    return {
+      type: "scatter", mode: "markers", name: `${escaped(report.other.name)}: ${nameOfMarks(kind, values)}`,
+      x: those.map((row) => at(map.x.name, row)), y: values.map((value) => (Number.isNaN(value) ? foot : value)),
+      said: (i) => `<b>${escaped(report.other.name)}, run ${at("design_index", those[i])}: ${escaped(at("outcome", those[i]))}</b><br>${escaped(map.metric.label)}: ${withUnit(values[i], escaped(map.metric.unit ?? ""))}`,
+      marker: { symbol, size: 9, color: COLORS[2], line: { width: 1.5, color: COLORS[2] } },
+    };
+  });
+  return [...own, ...beside];
 }
 
 /** The row of the table of a run by its index in the design. */

@@ -209,7 +209,7 @@ function drawRunsOfCell() {
   const layout = { ...mapLayout(), height: 260, margin: { l: 66, r: 10, t: 26, b: 50 } };
   holder.redraw = drawRunsOfCell;
   holder.onpoint = ({ data }) => data !== undefined && openRow(data);
-  return drawPlot(holder, [...besideOther(pointTraces()), chosenTrace()], layout).then(() => {
+  return drawPlot(holder, [...tracesOfCell(), chosenTrace()], layout).then(() => {
     if (cells.hasRuns) return;
     cells.hasRuns = true;
     holder.setAttribute("aria-label", "Runs of the cell. Arrow keys open the neighbouring run.");

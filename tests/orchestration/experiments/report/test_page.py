@@ -355,7 +355,7 @@ def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_see
         '[[axes]]\nname = "timing.period"\nvalues = [0.01, 0.02]\n'
         '[[axes]]\nname = "timing.loss"\nvalues = [0.0, 0.5]\n[[axes]]\nname = "seed"\nvalues = [1, 2]\n'
     )
-    sweep(load_study(file), out=tmp_path)
+    swept = sweep(load_study(file), out=tmp_path)
     page = show(report(file, out=tmp_path, flights=16))
     chosen = page.locator("#map-controls select")
     opened = chosen.evaluate("select => select.selectedOptions[0].textContent")
@@ -368,6 +368,10 @@ def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_see
     wait_for(page, "document.getElementById('cell-title').textContent === 'period 20 ms, loss 0.5'")
     assert "0 of 2 settled: 0 %, 95 % interval 0 % to 66 %" in page.inner_text("#cell-text")
     assert {"0/2", "0/1"} <= {*page.locator("#map-plot text").all_text_contents()}
+    page.close()
+    page = show(report(swept, swept, out=tmp_path, flights=0))
+    marks = page.evaluate("document.getElementById('cell-plot').data.map((one) => [one.name, one.marker.symbol])")
+    assert marks[:2] == [["laws: bounded (2)", "x-thin-open"], ["laws: bounded (2)", "cross-thin-open"]]
     page.close()
 
 
