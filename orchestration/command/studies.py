@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 StudyFile = Annotated[Path, typer.Argument(help="Study file.", metavar="STUDY.toml")]
 
+At = Annotated[
+    list[str] | None, option("--at", "Only the cells at that value of an axis; may be repeated.", "NAME=VALUE")
+]
+
 FIRST = 1000
 """Number of runs of a study that are checked for infinite means"""
 
@@ -111,6 +115,7 @@ def export(
     metric: Annotated[
         str | None, option("--metric", "Metric whose medians, or shares, in the cells are written too.")
     ] = None,
+    at: At = None,
 ) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies.store import store_folder, store_path
@@ -120,6 +125,8 @@ def export(
     printed_tables.expect_format(table)
     if what.is_dir() and (table, metric) != (None, None):
         raise UsageError(f"{what}: expected a study file with --table and --metric")
+    if at and table is None:
+        raise UsageError("--at: expected --table with it, which it is for; the files have all cells")
     if what.is_dir() and store is not None:
         raise UsageError(f"{what}: expected a study file with --store")
     if what.is_dir() and not store_path("", what).is_file():
@@ -133,7 +140,7 @@ def export(
     from orchestration.command.study_table import study_table
     from orchestration.experiments.studies.shares import GOOD
 
-    printed = study_table(study, path, metric or GOOD)
+    printed = study_table(study, path, metric or GOOD, at or ())
     written = of_study(path, formats or (), study, metric, out=out)
     for file in written:
         inform(str(file))  # standard output is the table alone, for a file
@@ -149,6 +156,7 @@ def draw(
     metric: Annotated[
         str | None, option("--metric", "Metric to draw; default: the first objective that varies.")
     ] = None,
+    at: At = None,
     *,
     look: FigureFlags,
 ) -> CommandResult:
@@ -162,7 +170,7 @@ def draw(
         expect_metric(loaded, metric)
         store = store_folder(loaded.name, store, out)
         _current_store(study, store)
-        return result_of_files(draw_study(loaded, store, metric, look.figure_style, progress, out=out))
+        return result_of_files(draw_study(loaded, store, metric, look.figure_style, progress, out=out, at=at or ()))
 
 
 def _sweep_command(study: Path, out: Path | None) -> str:

@@ -1,11 +1,12 @@
 """The cells of a study as a table for a paper, with intervals at 95 %."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
-from orchestration.experiments.studies.axes import name_of, quantity_of
+from orchestration.experiments.studies.axes import name_of, picked, quantity_of
 from orchestration.experiments.studies.shares import (
     BOOLEAN,
     GOOD,
@@ -20,7 +21,7 @@ from orchestration.experiments.studies.shares import (
     without_value,
 )
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import OF_CELLS, expect_metric_of_cells, frame, units_in
+from orchestration.experiments.studies.table import OF_CELLS, expect_metric_of_cells, frame, place_of, rows_at, units_in
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.requirements import is_number
@@ -29,22 +30,27 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def study_table(study: Study, store: Path, metric: str = GOOD) -> PrintedTable:
+def study_table(study: Study, store: Path, metric: str = GOOD, at: Sequence[str] = ()) -> PrintedTable:
     """A row for each cell with its share of good runs, or of those with another metric that is true, or a median.
 
-    Of two laws both stand side by side with their difference. The numbers are those of the files that `export`
-    writes. Raises `UsageError` for a study without repetitions, and for a metric that is none.
+    `at` chooses values of axes, as `delay=0.02`. Of two laws both stand side by side with their difference. The numbers
+    are those of the files that `export` writes. Raises `UsageError` for a study without repetitions, and for a metric
+    or a value that is none.
     """
     if study.cell_names is None:
         raise UsageError(f"--table: {OF_CELLS}")
     expect_metric_of_cells(study, metric)
-    rows, names = with_chance(frame(store), study), study.cell_names
+    chosen = picked(study.cell_axes, at)
+    axes = [axis for axis in study.cell_axes if axis.name not in chosen]
+    rows, names = with_chance(rows_at(frame(store), chosen), study), [axis.name for axis in axes]
+    if not axes:
+        raise UsageError("--at: expected an axis besides, for a table of cells")
     laws, units, word = laws_of(rows, names), units_in(store), study.origin.criterion.outcomes[0]
     is_share = metric in BOOLEAN
     if is_share:
         rows, word = judged_by(rows, metric), word if metric == GOOD else labels.metric(metric)
     cells = shares_of(rows, names) if is_share else medians_of(rows, names, metric)
-    others = [axis for axis in study.cell_axes if laws is None or axis.name != laws.axis]
+    others = [axis for axis in axes if laws is None or axis.name != laws.axis]
     quantities = {axis.name: quantity_of(axis, units) for axis in others}
     first = cells if laws is None else cells[cells[laws.axis] == laws.first]
     columns = {
@@ -79,6 +85,8 @@ def study_table(study: Study, store: Path, metric: str = GOOD) -> PrintedTable:
             texts = partial(texts, column="difference", count="pairs")
             caption += f"; difference: median of {minus} over the pairs that are both {word}"
         columns["difference"] = texts(first[by].merge(found, how="left", on=by))
+    if chosen:
+        caption += f"; at {place_of(study, chosen, units)}"
     if cells["low"].isna().any():
         caption += "; no interval where nothing is random" + ("" if is_share else ", or runs are too few")
     numbers = (

@@ -8,7 +8,7 @@ from typing import Any, Literal, overload
 import numpy as np
 
 from orchestration.experiments.studies import sensitivity
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.records import Scalar, record
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.figures import cells
@@ -233,6 +233,32 @@ def quantity_of(axis: Axis, units: Mapping[str, str]) -> Quantity:
 def name_of(axis: Axis) -> str:
     """The display name of an axis: its own name, or that of its target if it is named by its path."""
     return labels.setting(axis.name) if axis.name in axis.targets else labels.words(axis.name)
+
+
+def picked(axes: Sequence[Axis], texts: Sequence[str]) -> dict[str, Value]:
+    """The values of axes in texts such as `delay=0.02`; raises `UsageError` for one that a study does not list."""
+    listed = {axis.name: axis.values for axis in axes if axis.values is not None}
+    found: dict[str, Value] = {}
+    for text in texts:
+        name, _, wanted = text.partition("=")
+        if name not in listed or name in found:
+            raise UsageError(
+                f"--at {text}: expected NAME=VALUE, once for each NAME of {', '.join(listed) or 'no axis'}"
+            )
+        same = [value for value in listed[name] if _is_written(value, wanted)]
+        if not same:
+            raise UsageError(f"--at {text}: expected one of {', '.join(map(shown, listed[name]))}")
+        found[name] = same[0]
+    return found
+
+
+def _is_written(value: Value, text: str) -> bool:
+    if isinstance(value, (bool, str)):
+        return text in (str(value), str(value).lower(), str(value).rpartition("/")[2])
+    try:
+        return math.isclose(value, float(text), rel_tol=1e-9)
+    except ValueError:
+        return False
 
 
 def edges(axis: Axis, values: Floats) -> Floats:

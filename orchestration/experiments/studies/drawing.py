@@ -1,6 +1,6 @@
 """The figures of a study: chosen by its axes, drawn from its store, written beside it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
-from orchestration.experiments.studies.axes import unit_points
+from orchestration.experiments.studies.axes import Axis, Value, picked, unit_points
 from orchestration.experiments.studies.cell_figures import MAX_PANELS, cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
@@ -17,7 +17,7 @@ from orchestration.experiments.studies.shares import BOOLEAN, GOOD, judged_by, w
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import frame, note_in, units_in
+from orchestration.experiments.studies.table import frame, note_in, place_of, rows_at, units_in
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share, warn
@@ -44,15 +44,17 @@ def draw_study(
     progress: Share = lambda share: None,
     *,
     out: Path | None = None,
+    at: Sequence[str] = (),
 ) -> list[Path]:
     """Draw a metric from the store of `study` in a folder, default: the first objective that varies; the paths.
 
     The figures are written to `out`, by default beside the store. With `design.repeat` the default is the share of good
-    runs. Raises `UsageError` for an unknown metric, or axes for
-    which there is no figure.
+    runs. `at` chooses values of axes, as `delay=0.02`, for a figure over the others. Raises `UsageError` for an unknown
+    metric or value, or axes for which there is no figure.
     """
     path = store_path(study.name, folder)
-    drawn, indices = study_figures(study, path, metric, style)
+    drawn, indices = study_figures(study, path, metric, style, picked(study.cell_axes, at))
+    drawn = {"_".join((name, *at)).replace("/", "_"): figure for name, figure in drawn.items()}
     place = path.parent if out is None else out
     with new_files(place) as new:
         tables = [sensitivity.write(indices, new / f"{next(iter(drawn))}.csv")] if indices else []
@@ -61,14 +63,16 @@ def draw_study(
 
 
 def study_figures(
-    study: Study, store: Path, metric: str | None, style: Style = SCREEN
+    study: Study, store: Path, metric: str | None, style: Style = SCREEN, at: Mapping[str, Value] = {}
 ) -> tuple[dict[str, Figure], list[sensitivity.Index]]:
     """The figures of a metric over the axes of `study` by name, and the sensitivity indices that they show, if any.
+
+    They are of the runs with the values `at` of some axes, over the others.
 
     Raises `UsageError` as `draw_study` does.
     """
     expect_metric(study, metric)
-    table, units = frame(store), units_in(store)
+    table, units = rows_at(frame(store), at), units_in(store)
     if not (table["status"] == "done").any():
         raise UsageError(f"{store}: expected at least one finished run, as sweep makes them")
     if metric is None and study.repeat is not None:
@@ -76,26 +80,32 @@ def study_figures(
     if metric is None:
         metric = _default_metric_of(study, table)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
-    note = note_in(table)
-    if note is not None:
+    if note := note_in(table):
         warn(note)
+    note = "\n".join(filter(None, (place_of(study, at, units), note))) or None
     with style.applied():
         if indices:
             drawn = {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}
         else:
-            drawn = _over_axes(study, table, metric, units, style)
+            axes = tuple(axis for axis in study.cell_axes if axis.name not in at)
+            drawn = _over_axes(study, axes, table, metric, units, style)
         for figure in drawn.values():
             figures.add_note(figure, note, style)
     return drawn, indices
 
 
 def _over_axes(
-    study: Study, table: "pd.DataFrame", metric: str, units: Mapping[str, str], style: Style
+    study: Study,
+    cell_axes: Sequence[Axis],
+    table: "pd.DataFrame",
+    metric: str,
+    units: Mapping[str, str],
+    style: Style,
 ) -> dict[str, Figure]:
     system = study.origin
     words = system.criterion.outcomes
-    axes = tuple(axis for axis in study.cell_axes if axis.is_numeric)
-    named = [axis for axis in study.cell_axes if not axis.is_numeric]
+    axes = tuple(axis for axis in cell_axes if axis.is_numeric)
+    named = [axis for axis in cell_axes if not axis.is_numeric]
     third = (*named, *axes[2:])
     fits = all(axis.values is not None for axis in axes) and all(len(a.values or ()) <= MAX_PANELS for a in axes[2:])
     if study.repeat is not None or named or metric == GOOD:
@@ -103,8 +113,9 @@ def _over_axes(
             raise UsageError(
                 f"{study.name}: expected one or two axes of numbers with values, at most one of names or a third of "
                 f"numbers (up to {MAX_PANELS}, a map for each: it is the one listed last), "
-                "and design.repeat for the axis of repetitions, to draw; export --table prints the cells over any axes "
-                "with values, report shows all runs, and compare draws shares over random initial conditions"
+                "and design.repeat for the axis of repetitions, to draw; --at NAME=VALUE draws the cells at one value "
+                "of an axis, export --table prints them over any axes with values, report shows all runs, and compare "
+                "draws shares over random initial conditions"
             )
         panels, table, of = third[0] if third else None, with_chance(table, study), metric
         if metric in BOOLEAN:

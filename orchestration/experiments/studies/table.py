@@ -12,6 +12,7 @@ from pyarrow import csv
 
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import shares
+from orchestration.experiments.studies.axes import quantity_of
 from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -19,6 +20,7 @@ from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.recording import mat_file
 from orchestration.simulation.runs.run_directory import MAT, load_run
+from orchestration.systems.system.requirements import is_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +60,19 @@ def _guids_by_row(guid: Mapping[str, Any], settings: Mapping[str, Sequence[Any]]
     """The GUID of each row by the values of the axes that choose its FMU."""
     known = {tuple(values): one for values, one in guid["of"]}
     return [known.get(values) for values in zip(*(settings[axis] for axis in guid["axes"]))]
+
+
+def rows_at(table: "pd.DataFrame", at: Mapping[str, Any]) -> "pd.DataFrame":
+    """The rows with these values of some axes."""
+    for name, value in at.items():
+        table = table[table[name] == value]
+    return table
+
+
+def place_of(study: Study, at: Mapping[str, Any], units: Mapping[str, str]) -> str:
+    """The values of some axes in words, as "delay 20 ms, loss 0.1"."""
+    known = {axis.name: quantity_of(axis, units) for axis in study.axes if axis.name in at}
+    return ", ".join(f"{known[k].name} {known[k].text_of(v) if is_number(v) else v}" for k, v in at.items())
 
 
 def note_in(table: "pd.DataFrame") -> str | None:

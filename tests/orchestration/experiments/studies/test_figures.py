@@ -126,6 +126,14 @@ def test_more_axes_are_drawn_as_dots_over_each_and_three_of_a_grid_as_a_map_for_
     assert [*study_figures(many, store_path(many.name, tmp_path), "ultimate_bound")[0]] == ["ultimate_bound"]
     with pytest.raises(UsageError, match="a third of numbers \\(up to 9, a map for each: it is the one listed last"):
         study_figures(many, store_path(many.name, tmp_path), "good")
+    names = [path.name for path in draw_study(many, tmp_path, "good", PNG, at=["plant.mass=2"])]
+    assert names == ["good_map_plant.mass=2.png"]
+    figure = study_figures(many, store_path(many.name, tmp_path), "good", at={"plant.mass": 2.0})[0]["good_map"]
+    assert figure.get_suptitle().endswith("mass 2 kg")
+    assert len(figure.axes) == 2, "one map and its bar"
+    for wrong, expected in (("mass=1", "NAME=VALUE, once for each NAME of "), ("plant.mass=2.5", r"one of 1\.0, 2\.0")):
+        with pytest.raises(UsageError, match=f"{wrong}: expected {expected}"):
+            draw_study(many, tmp_path, "good", PNG, at=[wrong])
 
 
 def test_an_unknown_metric_is_reported_with_the_known_ones(tmp_path: Path) -> None:
