@@ -114,6 +114,7 @@ def locus(
     flags: FlightFlags,
 ) -> CommandResult:
     """Compute the poles of the sampled loop over a quantity, and where they leave the unit circle; draw them."""
+    from orchestration.theory.stability.poles import in_words
     from orchestration.theory.stability.root_locus import locus as locus_of
 
     found = locus_of(request_from(scenario, flags, timing), of, first=first, last=last, count=count)
@@ -121,9 +122,8 @@ def locus(
         _draw(found.plot(), out)
     rows = [("crossing", "value", "pole")]
     for one in found.crossings:
-        pole = f"{one.z.real:.4f}" + (f" ± {one.z.imag:.4f}j" if one.z.imag else "")
         way = "leaves" if one.leaves else "returns"
-        rows.append((way, found.place_of(one).removeprefix("at "), pole))
+        rows.append((way, found.place_of(one).removeprefix("at "), in_words(one.z)))
     each = [[[pole.real, pole.imag] for pole in some if pole == pole] for some in found.poles.tolist()]
     crossings = [
         {

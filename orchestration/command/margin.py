@@ -163,8 +163,8 @@ def linearise(
 ) -> CommandResult:
     """Linearise a loop about its operating point, from sample to sample: a component, and the rest of the loop.
 
-    Poles are those of the closed loop, in the z-plane; frequency and damping are of log(z) / dt. With --json A, B, C
-    and D of both, and the names of their inputs and outputs.
+    Poles are those of the closed loop, in the z-plane, but for those at 0; frequency and damping are of log(z) / dt.
+    With --json A, B, C and D of both, and the names of their inputs and outputs.
 
     Of one FMU: A, B, C and D about its start, with the poles of A; in continuous time by model exchange, with --period
     from sample to sample by any interface.
@@ -172,6 +172,7 @@ def linearise(
     if scenario is not None and scenario.suffix.lower() == ".fmu" and component is None:
         return _of_plant(request_from(scenario, dataclasses.replace(flags, period=None), timing), flags.period)
     from orchestration.theory.stability.linearise import linearise as linearised_loop
+    from orchestration.theory.stability.poles import REAL, in_words
 
     loop = linearised_loop(request_from(scenario, flags, timing), component)
     halves = {loop.name: loop.component, "rest": loop.rest}
@@ -187,12 +188,12 @@ def linearise(
     lines = [f"{name:<17}  {_summary(half, loop.samples)}" for name, half in halves.items()]
     rows = [("pole", "size", "frequency", "damping")]
     for pole in loop.poles:
-        if pole.z.imag >= 0.0:
-            size, damping = abs(pole.z), pole.damping
-            place = f"{pole.z.real:.4f}" + (f" ± {pole.z.imag:.4f}j" if pole.z.imag else "")
-            damped = "-" if damping is None else f"{damping:.3f}"
-            rows.append((place, f"{size:.4f}", f"{pole.frequency:.4g} rad/s", damped))
+        if pole.z.imag >= -REAL:
+            damped = "-" if pole.damping is None else f"{pole.damping:.3f}"
+            rows.append((in_words(pole.z), f"{abs(pole.z):.4f}", f"{pole.frequency:.4g} rad/s", damped))
     lines += in_columns(rows, right=True) if loop.poles else ()
+    if len(loop.poles) < len(loop.component.A) + len(loop.rest.A):
+        lines.append("poles at z = 0 are not listed: they are of what a period forgets")
     return CommandResult(document=document, verdict=loop.verdict, lines=lines)
 
 

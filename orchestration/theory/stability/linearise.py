@@ -56,7 +56,8 @@ class Linearised:
     inputs."""
     samples: int = 1
     """Samples of the component in a period of the loop, over which both halves go: more than 1 where others are slower,
-    or its own code has slower tasks. The signals of sample k end in [k] then."""
+    or its own code has slower tasks. The signals of sample k end in [k] then: [0] is the sample after that in which all
+    rates meet, which is the last."""
     radius: float
     """The spectral radius of the whole loop, closed, over a period, with what its halves leave out: below 1 small
     deviations decay."""

@@ -15,6 +15,8 @@ BALANCINGS = 60
 """Most rounds in which these units are chosen"""
 DRIFT = 1e-9
 """Distance of a pole from 1 at which it has neither damping nor a direction"""
+REAL = 1e-6
+"""Imaginary part up to which a pole is real in words: rounding splits a double one by the root of a float's digits"""
 
 Complexes = npt.NDArray[np.complex128]
 
@@ -42,6 +44,13 @@ def _as_pole(z: complex, dt: float) -> Pole:
     s = 0j if is_drift else cmath.log(z) / dt
     damping = None if is_drift else -s.real / abs(s)
     return Pole(z=z, frequency=abs(s), damping=damping)
+
+
+def in_words(z: complex) -> str:
+    """A pole of the z-plane, with its conjugate."""
+    size = abs(z.imag)
+    digits = ".4f" if size >= 1e-4 else ".2g"
+    return f"{z.real:.4f}" + (f" ± {size:{digits}}j" if size > REAL else "")
 
 
 def poles_of(matrix: Floats) -> Complexes:

@@ -15,6 +15,7 @@ from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability.period_map import growth_of_loop
+from orchestration.theory.stability.poles import in_words
 from orchestration.theory.stability.state_space import reduced
 from quadcosim import Linearised, QuadcosimError, StateSpace, Timing, UsageError, bode, linearise
 from tests.commands import Main
@@ -163,7 +164,7 @@ def test_without_python_control_one_line_names_the_extra(monkeypatch: pytest.Mon
         empty.to_control()
 
 
-def test_the_command_writes_the_matrices_that_python_has(main: Main) -> None:
+def test_the_command_writes_the_matrices_that_python_has(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
     file = EXAMPLES / "double_integrator" / "system.toml"
     loop = linearise(example("double_integrator"))
     document = json.loads(main("linearise", file, "--native", "--json").stdout)
@@ -176,3 +177,14 @@ def test_the_command_writes_the_matrices_that_python_has(main: Main) -> None:
     lines = main("linearise", file, "--native").stdout.splitlines()
     assert lines[0].startswith(f"stable: spectral radius {loop.radius:.4g}, sampled every ")
     assert lines[2].endswith(f"{len(loop.rest.A)} states, every {time_text(loop.rest.dt)}")
+    assert "z = 0" not in lines[-1]
+    shorter = dataclasses.replace(loop, poles=loop.poles[:1])
+    monkeypatch.setattr("orchestration.theory.stability.linearise.linearise", lambda *_: shorter)
+    lines = main("linearise", file, "--native").stdout.splitlines()
+    assert lines[-1] == "poles at z = 0 are not listed: they are of what a period forgets"
+
+
+def test_a_double_pole_that_rounding_splits_is_real_in_words_and_a_slow_oscillation_is_none() -> None:
+    assert in_words(0.9966 + 2e-8j) == "0.9966"
+    assert in_words(0.99999 - 3.2e-5j) == "1.0000 ± 3.2e-05j"
+    assert in_words(0.5 + 0.25j) == "0.5000 ± 0.2500j"
