@@ -1,7 +1,7 @@
 """The largest good value of a quantity, measured by runs, and its local limit by linear theory."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
@@ -17,6 +17,7 @@ from orchestration.simulation.engines.resolved import check_against_fmus, other_
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import bound_of
+from orchestration.simulation.runs.scheduling import schedule
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.systems.system.files import Files, files_of
@@ -115,13 +116,21 @@ def limit(
         local_accuracy=local.accuracy, local_lower_limit=local.lower, mean_square_limit=mean_square.limit,
         large_signal_limit=None if bracket is None else bracket.good,
         large_signal_lower_limit=None if lower is None else lower.good,
-        refuted_limit=refuted, follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
+        refuted_limit=refuted, missed_deadlines_from=_missed_from(varied, sorted(trials.tried)),
+        follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
         scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
         ),
         continuous=ideal, tried=tried, note="; ".join(note),
     )  # fmt: skip
+
+
+def _missed_from(varied: Varied, values: Sequence[float]) -> float | None:
+    """The lowest of some rising values at which the schedule of a system misses deadlines."""
+    if not (varied.system.computers or varied.system.networks):
+        return None
+    return next((value for value in values if schedule(varied.at(value)).misses_deadlines), None)
 
 
 def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, Files]:
@@ -152,7 +161,7 @@ _ALWAYS = ("local_limit", "large_signal_limit")
 """Fields that are shown also where they have no value"""
 _IN_ITS_UNIT = (
     *_ALWAYS, "local_limit_outside", "local_accuracy", "local_lower_limit", "mean_square_limit",
-    "large_signal_lower_limit", "refuted_limit", "tolerance", "scan",
+    "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from", "tolerance", "scan",
 )  # fmt: skip
 """Fields in the unit of the quantity"""
 _OF_UNITS = ("unit", "judged_unit")

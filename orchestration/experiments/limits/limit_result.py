@@ -64,6 +64,8 @@ class Limit:
     refuted_limit: float | None
     """The lowest evaluated value of a random quantity at which so many seeds fail that `RELIABILITY` is refuted at the
     confidence; None: nothing is random, or there is none in the range."""
+    missed_deadlines_from: float | None = None
+    """The lowest evaluated value at which tasks or messages miss deadlines; None: none do."""
     follows: str = ""
     """The references and the components that follow them; empty if there are none."""
     horizon: float
@@ -109,6 +111,8 @@ class Limit:
         under = [one for one in failed if low is not None and one.value < low][-1:]
         over = [one for one in failed if (low is None or one.value > low) and (good is None or one.value > good)][:1]
         again = f"; good again at {some(map(shown, self.flies_above))}" if self.flies_above else ""
+        if self.missed_deadlines_from is not None:
+            again += f"; deadlines are missed already at {shown(self.missed_deadlines_from)}"
         if over and good is None:
             begins = f"not good even at {shown(over[0].value)}, where the scan begins: {how(over[0])}"
             return f"{self.of} {begins}{again} ({resolution})"

@@ -45,6 +45,11 @@ class Scheduled:
     """All jobs and frames, in nanoseconds."""
 
     @property
+    def misses_deadlines(self) -> bool:
+        """Whether any task or message misses a deadline."""
+        return any(one.missed for one in (*self.tasks.values(), *self.messages.values()))
+
+    @property
     def verdict(self) -> str:
         """Which deadlines are missed, or how near the worst response comes to one, and what is busiest."""
         each = {**self.tasks, **self.messages}

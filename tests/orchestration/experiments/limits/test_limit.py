@@ -33,6 +33,7 @@ from orchestration.quadrotor.scenarios.wiring import COMMAND
 from orchestration.simulation.requests.ranges import Varied, search_range
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.file import system_from_tables
 from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
@@ -538,6 +539,14 @@ def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
     assert "within a tenth of the local limit" in limits.limit(scenario_of(), "period").note
+
+
+def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
+    tasks = {name: {"period": 0.004, "priority": i, "execution": 0.002} for i, name in enumerate(("fast", "load"))}
+    system = system_from_tables({"stop_time": 0.1, "computers": {"cpu": {"tasks": tasks}}}, Path())
+    varied = Varied(request=system, of="computers.cpu.tasks.load.execution")
+    assert limits._missed_from(varied, [0.001, 0.002]) is None  # 100 % busy, and in time
+    assert limits._missed_from(varied, [0.001, 0.0025, 0.003]) == 0.0025
 
 
 def test_a_range_without_failures_or_without_good_values_is_noted(
