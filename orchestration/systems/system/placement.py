@@ -86,15 +86,6 @@ def released_by(system: "System") -> dict[str, tuple[str, ...]]:
     return found
 
 
-def expect_fixed_periods(system: "System") -> None:
-    """Raise `UsageError` for a system with instants that the scheduler computes."""
-    placed = [task.place for task in tasks_of(system).values()]
-    placed += [message.place for message in messages_by_connection(system).values()]
-    placed += [f"components.{name}.sampling.on" for name in _by_arrivals(system)]
-    if placed:
-        raise UsageError(f"{placed[0]}: its instants are scheduled, and a linearised loop needs a fixed period")
-
-
 def _by_arrivals(system: "System") -> dict[str, str]:
     """The connections whose messages release components, by component."""
     samplings = {name: one.sampling for name, one in system.components.items()}

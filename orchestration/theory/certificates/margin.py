@@ -28,11 +28,11 @@ from orchestration.theory.certificates.certified_loop import DELAY, JITTER, LOSS
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.repeated import least_repeated
 from orchestration.theory.certificates.timeline import LoopTimeline
-from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import at_rest
+from orchestration.theory.stability.scheduled import without_scheduler
 
 MOST_LOST, MOST_LOST_GIVEN = 8, 16
 """Losses in a row that are considered, and that may be requested: sequences double with each"""

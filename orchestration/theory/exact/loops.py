@@ -29,12 +29,12 @@ from orchestration.theory.exact.initial_state import InitialState, initial_state
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
-from orchestration.theory.exact.repeating import periodic_schedule
-from orchestration.theory.exact.scheduled import without_scheduler
 from orchestration.theory.exact.timing import links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain, costs_until
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, at_rest
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
+from orchestration.theory.stability.periodic_schedule import periodic_schedule
+from orchestration.theory.stability.scheduled import without_scheduler
 
 T = TypeVar("T")
 

@@ -21,7 +21,7 @@ from orchestration.theory.exact.random_times import (
     table,
     uniform,
 )
-from orchestration.theory.exact.repeating import NO_SCHEDULE, PeriodicSchedule
+from orchestration.theory.stability.periodic_schedule import NO_SCHEDULE, PeriodicSchedule
 
 
 def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[SampledTask]:
@@ -57,13 +57,14 @@ def links_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[R
 
 
 def _scheduled_link(link: RandomLink, x: Connection, schedule: PeriodicSchedule) -> RandomLink:
+    late = schedule.transit_times.get(x.name, (0,) * len(schedule.samples.get(x.sender, ())))
+    transit_times = tuple(None if each is None else each * (ATTOSECONDS // NANOSECONDS) for each in late)
     if x.sender in schedule.samples:
-        nothing = (0,) * len(schedule.samples[x.sender])
-        link = replace(link, transit_times=schedule.transit_times.get(x.name, nothing))
+        link = replace(link, transit_times=transit_times)
     if x.name in schedule.sent:
         link = replace(
             link, receiver=None, step=schedule.period, send_offsets=schedule.sent[x.name],
-            transit_times=schedule.transit_times[x.name],
+            transit_times=transit_times,
         )  # fmt: skip
     if x.name in schedule.with_own_delay:
         link = replace(link, delay=0, delay_jitter=CERTAIN, loss=0.0, burst_length=None)

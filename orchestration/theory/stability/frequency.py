@@ -37,7 +37,6 @@ from orchestration.theory.stability.linearise import (
 )
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
 from orchestration.theory.stability.loop_halves import closed, radius
-from orchestration.theory.stability.operating_point import deterministic
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
 
@@ -208,7 +207,7 @@ def expect_decided(loop: Linearised) -> None:
 
 def _bode(request: Request, component: str | None) -> Bode:
     with errors_in_own_terms(request), closing(Instances()) as instances:
-        system = deterministic(rested(request))
+        system = rested(request)
         name = sampled_component(system, component)
         models = files_of(system).models_of(system)
         with progress_bar("margins") as report, whole_at_rest(system, instances, models=models) as rest:

@@ -27,8 +27,8 @@ from orchestration.systems.system.component import Component, Parameter, Samplin
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
-from orchestration.systems.system.placement import expect_fixed_periods
 from orchestration.theory.stability.excitation import Rest
+from orchestration.theory.stability.fixed_periods import in_fixed_periods
 from orchestration.theory.stability.identification import FINEST, SampledRest, in_continuous_time, of_samples
 from orchestration.theory.stability.in_double import are_in_double, expect_same_law
 from orchestration.theory.stability.lifted_component import LiftedTangent
@@ -232,7 +232,7 @@ def at_rest(
     and those of equal components there are used again where they hold. Raises `UsageError` where the system does not
     rest there, or has no linear loop, saying why.
     """
-    calm = deterministic(system)
+    calm = in_fixed_periods(system)
     known = KnownTangents() if known is None else known
     with _settled(calm, _expect_period(calm), instances, extra, models, known) as loop:
         yield loop
@@ -249,7 +249,7 @@ def whole_at_rest(
 
     Their tangents are measured where they rest over that period, once.
     """
-    calm, known = deterministic(system), KnownTangents() if known is None else known
+    calm, known = in_fixed_periods(system), KnownTangents() if known is None else known
     seen = {name: samples_of(one) for name, (_, _, one) in known.items() if name in calm.components}
     period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
     with _settled(calm, period, instances, NO_SIGNALS, models, known) as loop:
@@ -297,7 +297,10 @@ def _settled(
 
 def keep_start(system: System, instances: Instances, known: KnownTangents) -> None:
     """Keep in `known` where a system comes to rest that has a time to run to rest; raises `UsageError`."""
-    calm = deterministic(system)
+    try:
+        calm = in_fixed_periods(system)
+    except UsageError:  # runs need no fixed periods
+        calm = deterministic(system)
     start_of(calm, hyperperiod_of(calm) or longest_period(calm), instances, known)
 
 
@@ -375,7 +378,6 @@ def expect_whole_instances(system: System) -> None:
 def _expect_period(system: System) -> Fraction:
     if not system.connections:
         raise UsageError("there is no loop, as no component is connected: expected [[connections]]")
-    expect_fixed_periods(system)
     expect_whole_instances(system)
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":

@@ -15,17 +15,19 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import progress_bar
-from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.workers.choice import single_run_execution
+from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart_of
+from orchestration.theory.stability.fixed_periods import in_fixed_periods
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start, whole_at_rest
@@ -231,12 +233,15 @@ def _shortening(beside: tuple[list[Fraction], float] | None, unit: str | None) -
 def _beside_jumps(varied: Varied, system: System, values: list[float]) -> list[float]:
     """The values, and those to both sides of each jump between them, of a delay to a sampled component."""
     found, (first, last) = set(values), (values[0] * NANOSECONDS, values[-1] * NANOSECONDS)
-    for x in system.connections:
-        apart = apart_of(system, x) if f"connections.{x.name}.delay" in varied.paths else None
+    calm = in_fixed_periods(system)
+    for own, x in zip(system.connections, calm.connections):
+        apart = apart_of(calm, x) if f"connections.{x.name}.delay" in varied.paths else None
         if apart is None or last - first > MOST_JUMPS * apart.interval:
             continue
-        counts = range(math.floor((last - apart.first) / apart.interval) + 1)
-        jumps = (float(apart.first + k * apart.interval) / NANOSECONDS for k in counts)
+        before = exact_nanoseconds(lowest(x.delay)) - exact_nanoseconds(lowest(own.delay))
+        least = (apart.first - before) % apart.interval
+        counts = range(math.floor((last - least) / apart.interval) + 1)
+        jumps = (float(least + k * apart.interval) / NANOSECONDS for k in counts)
         sides = (round(jump + side, 9) for jump in jumps for side in SIDES)
         found.update(side for side in sides if values[0] <= side <= values[-1])
     return sorted(found)

@@ -16,9 +16,9 @@ from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.expect import expect
 from orchestration.theory.exact.loops import expect_same_steps
-from orchestration.theory.exact.repeating import periodic_schedule
 from orchestration.theory.exact.timing import sampled_tasks
 from orchestration.theory.stability.matrices import Components, SampledSystem
+from orchestration.theory.stability.periodic_schedule import periodic_schedule
 from quadcosim import run
 from tests.examples.common import native_example as example
 from tests.extent import sample

@@ -25,11 +25,8 @@ from orchestration.systems.system.component import Sampling, has_scheduled_insta
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
-from orchestration.theory.exact.random_times import ATTOSECONDS
-from orchestration.theory.exact.scheduled import expect_certain
 from orchestration.theory.stability.operating_point import hyperperiod
-
-_FROM_NANOSECONDS = ATTOSECONDS // NANOSECONDS
+from orchestration.theory.stability.scheduled import expect_certain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +40,7 @@ class PeriodicSchedule:
     sent: Mapping[str, tuple[Fraction, ...]]
     """Times at which messages are sent [s], by connection from continuous time over a network"""
     transit_times: Mapping[str, tuple[int | None, ...]]
-    """Times from its sample, or its sending, to its arrival [attoseconds], by connection; None: it does not arrive"""
+    """Times from its sample, or its sending, to its arrival [ns], by connection; None: it does not arrive"""
     with_own_delay: frozenset[str]
     """connections whose own delays and losses `transit_times` include"""
 
@@ -93,7 +90,7 @@ class ScheduleTrace:
             is_open = (outcome[which] == NONE) | ((outcome[which] == 0) & (arrives[which] == NONE))
             if is_open.any() and not until:
                 return None
-            late = ((arrives - times)[which] * _FROM_NANOSECONDS).tolist()
+            late = (arrives - times)[which].tolist()
             transit_times[name] = tuple(each if arrives[k] != NONE else None for each, k in zip(late, which.tolist()))
             if sender == NONE:
                 sent[name] = offsets

@@ -12,7 +12,7 @@ from orchestration.systems.system.component import Component
 from orchestration.systems.system.computers import Computer, Message, Network, Task
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
-from orchestration.theory.exact.repeating import ScheduleTrace, periodic_schedule
+from orchestration.theory.stability.periodic_schedule import ScheduleTrace, periodic_schedule
 from tests.extent import tries
 from tests.orchestration.simulation.engines.random_systems import some
 
