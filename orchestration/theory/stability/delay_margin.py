@@ -39,6 +39,11 @@ REFINED = 16
 """Times that frequencies are halved where the return difference changes by more than its own size, in any direction"""
 SIDES = (0.0, 1.0 / NANOSECONDS)
 """Delays beyond a jump [s]: none, and the next one"""
+RESOLVED = 1e-6
+"""Least gain of a sensitivity, in any direction, of which rounding leaves the inverse in all others: where it is less
+the loop has too much gain to be near the end of its stability"""
+MOST_VALUES = 2_000_000
+"""Numbers that return differences at all frequencies consist of, at most"""
 MOST_JUMPS = 40
 """Jumps in a sample, to both sides of which the loop is tried, at most"""
 
@@ -59,7 +64,10 @@ def delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> f
     Where it becomes so in a jump, that is the longest one at which it is stable. `frequencies` go up to half the rate
     of the period [rad/s]. None: no delay makes it unstable. Raises `UsageError` where it is not found.
     """
-    command = LateCommand(loop=loop, i=i, frequencies=frequencies, late=late)
+    of = sensitivity_of(loop, i)
+    soon = of(frequencies)
+    resolved = np.linalg.svd(soon, compute_uv=False).min(axis=1) > RESOLVED
+    command = LateCommand(loop, i, frequencies[resolved], late, sensitivities={0.0: of}, soon={0.0: soon[resolved]})
     if not any(command.ends_stability(part) for part in (*np.arange(PARTS) * loop.dt / PARTS, *command.sides)):
         return None
     delay, before = 0.0, (0.0, command.growth(0.0))
@@ -105,7 +113,7 @@ def apart_of(system: System, connection: Connection) -> Apart | None:
     return Apart((other.true_offset - own.true_offset) % interval, interval)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class LateCommand:
     """A loop, one command of which comes later."""
 
@@ -171,6 +179,8 @@ class LateCommand:
             apart = np.maximum(*relative) > 1.0
             if not apart.any():
                 break
+            if difference.size > MOST_VALUES:
+                raise UsageError("the return difference of the loop changes too fast over the frequency to be followed")
             between = 0.5 * (frequencies[:-1] + frequencies[1:])[apart]
             added = self._difference(self._sensitivity(part)(between), whole, between)
             order = np.argsort(frequencies := np.append(frequencies, between))

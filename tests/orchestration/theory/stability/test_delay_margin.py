@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability import delay_margin as delay_margins
 from orchestration.theory.stability.delay_margin import Late, delay_margin
@@ -106,10 +107,14 @@ def test_a_margin_of_many_samples_is_found_between_frequencies_far_apart() -> No
     assert radius_late(plant, gains, 0.01, found - 1e-6) < 1.0 < radius_late(plant, gains, 0.01, found + 1e-6)
 
 
+@pytest.mark.parametrize("lowest", [1e-3, 1e-8])
 def test_frequencies_of_several_samples_are_not_refined_for_gains_that_are_large_beside_others(
-    monkeypatch: pytest.MonkeyPatch,
+    lowest: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of a double integrator at low frequencies, whose samples together have a large gain in one direction."""
+    """Those of a double integrator at low frequencies, whose samples together have a large gain in one direction.
+
+    At the lowest its inverse is beyond what rounding leaves.
+    """
     points = list[int]()
 
     def counted(loop: Linearised, i: int) -> Sensitivity:
@@ -123,7 +128,15 @@ def test_frequencies_of_several_samples_are_not_refined_for_gains_that_are_large
     plant, gains, dt = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), [[1.0, 1.4]] * 3, 0.05
     loop, late = loop_of(plant, gains, dt)
     half = math.pi / loop.rest.dt
-    found = delay_margin(loop, 0, np.geomspace(1e-3 * half, half, 100), late)
+    found = delay_margin(loop, 0, np.geomspace(lowest * half, half, 100), late)
     assert found is not None
     assert radius_late(plant, gains, dt, found - 2e-9) < 1.0 < radius_late(plant, gains, dt, found + 2e-9)
     assert max(points) == 100
+
+
+def test_a_return_difference_that_cannot_be_followed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delay_margins, "MOST_VALUES", 30)
+    loop, late = loop_of(np.array([[0.0, 1.0, 0.0], [0.0, -50.0, 50.0]]), [[1.0, 0.0]], 0.01)
+    half = math.pi / loop.dt
+    with pytest.raises(UsageError, match="changes too fast over the frequency to be followed"):
+        delay_margin(loop, 0, np.geomspace(1e-3 * half, half, 31), late)
