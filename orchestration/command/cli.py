@@ -28,6 +28,8 @@ from orchestration.foundation.processes.subprocesses import misleading_variables
 
 NO_THREAD = "can't start new thread"
 """Text of the error of Python if the system has no room for another one"""
+_SYNONYMS = {"--store": "--out"}
+"""Options that some commands take, by those of others for the same"""
 
 
 class _Interrupted(Exception):
@@ -167,7 +169,9 @@ def _usage_message(error: Exception) -> str | None:
     flag, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
     if not (flag and known):
         return str(describe())
-    return f"No such option: {flag}{did_you_mean(flag, known)}"
+    takes = {name for parameter in error.ctx.command.params for name in parameter.opts}  # type: ignore[attr-defined]
+    meant = _SYNONYMS.get(flag)
+    return f"No such option: {flag}{did_you_mean(flag, known) if meant not in takes else f'; did you mean {meant}?'}"
 
 
 if __name__ == "__main__":
