@@ -148,15 +148,17 @@ class FlightFlags:
     def applied_to(self, scenario: "Scenario") -> "Scenario":
         """`scenario` with these flags; raises `UsageError` for invalid values."""
         from orchestration.components.building.fmus import native_twins
-        from orchestration.quadrotor.scenarios.timing import TIMING_KEYS, preset_timing
+        from orchestration.quadrotor.scenarios.timing import LOSSES, TIMING_KEYS, loss_as_written, preset_timing
         from orchestration.quadrotor.scenarios.translation import DisturbanceChoice, ReferenceChoice, choice_of
         from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
         single = (key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
         timing |= {key: value for key in single if (value := self._timed(key)) is not None}
+        written = {*timing}
         if (loss := self._timed("loss")) is not None:
-            timing = {"measurement_loss": loss, "command_loss": loss, **timing}
+            written.add("loss")
+            timing = {**dict.fromkeys(LOSSES, loss), **timing}
         for name in _BY_MEASUREMENT:
             texts = getattr(self, name)
             if texts:
@@ -174,7 +176,8 @@ class FlightFlags:
         if self.disturbance is not None:
             top["disturbance"] = DisturbanceChoice(**choice_of(self.disturbance))
         parameters = assigned("set", self.set)
-        changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
+        with loss_as_written(written):
+            changed = scenario.with_changes(timing=timing, parameters=parameters, **top)
         if self.controller or self.plant:
             plant, controller = self.plant or changed.plant.fmu, self.controller or changed.controller.fmu
             changed = changed.with_fmus(plant=plant, controller=controller)

@@ -11,7 +11,7 @@ from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.nominal_model import hover_inputs
 from orchestration.quadrotor.scenarios.scenario import Scenario
-from orchestration.quadrotor.scenarios.timing import Timing, preset_timing
+from orchestration.quadrotor.scenarios.timing import LOSSES, Timing, loss_as_written, preset_timing
 from orchestration.quadrotor.scenarios.translation import SYSTEM, DisturbanceChoice, ReferenceChoice
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER, DEFAULT_PLANT
@@ -46,7 +46,11 @@ def load_scenario(path: str | Path) -> Scenario:
 
 def scenario_from_tables(tables: dict[str, Any], folder: Path) -> Scenario:
     """The scenario of a TOML document whose paths are relative to `folder`; raises `UsageError`."""
-    file = parsed(_expanded(tables), ScenarioFile)
+    with loss_as_written(timing if isinstance(timing := tables.get("timing"), dict) else ()):
+        return _scenario(parsed(_expanded(tables), ScenarioFile), folder)
+
+
+def _scenario(file: Any, folder: Path) -> Scenario:
     return Scenario(
         stop_time=file.stop_time,
         seed=file.seed,
@@ -69,7 +73,7 @@ def _expanded(tables: dict[str, Any]) -> dict[str, Any]:
         return tables
     written = {key: value for key, value in timing.items() if key not in Timing.SHORTHANDS}
     if "loss" in timing:
-        written = {"measurement_loss": timing["loss"], "command_loss": timing["loss"], **written}
+        written = {**dict.fromkeys(LOSSES, timing["loss"]), **written}
     if "preset" in timing:
         written = {**preset_timing(str(timing["preset"])), **written}
     return {**tables, "timing": written}

@@ -17,7 +17,7 @@ from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice, Record
 from orchestration.quadrotor.scenarios.initial_conditions import initial_conditions
 from orchestration.quadrotor.scenarios.nominal_model import axis_mismatch, model_mismatch
 from orchestration.quadrotor.scenarios.scenario_text import text_of
-from orchestration.quadrotor.scenarios.timing import Timing, range_of
+from orchestration.quadrotor.scenarios.timing import LOSSES, Timing, loss_as_written, range_of
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.simulation.results.objectives import with_own_objectives
 from orchestration.simulation.results.quantities import setting
@@ -230,7 +230,7 @@ class Scenario:
             table, _, key = target.partition(".")
             if table == "timing":
                 kind, _, name = key.partition(".")
-                keys = ("measurement_loss", "command_loss") if key == "loss" else (kind,)
+                keys = LOSSES if key == "loss" else (kind,)
                 new = {**getattr(self.timing, kind), **timing.get(kind, {}), name: value} if name else value
                 timing |= dict.fromkeys(keys, new)
             elif table in fmus and key == "fmu":
@@ -239,7 +239,8 @@ class Scenario:
                 parameters[target] = value
             else:
                 fields[target] = value
-        return self.with_changes(timing=timing, parameters=parameters, **fields).with_fmus(**fmus)
+        with loss_as_written([name.removeprefix("timing.") for name in values]):
+            return self.with_changes(timing=timing, parameters=parameters, **fields).with_fmus(**fmus)
 
     def without_vehicle(self) -> "Scenario":
         """The same without a vehicle, for a caller that sets the parameters itself."""

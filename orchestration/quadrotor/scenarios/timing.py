@@ -1,7 +1,8 @@
 """The timing of the digital loop of a run as one frozen value, and those of real flight stacks by name."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,6 +24,8 @@ from orchestration.systems.system.requirements import (
 )
 
 _PLACE = "timing."
+LOSSES = ("measurement_loss", "command_loss")
+"""Keys that `loss` stands for"""
 
 
 @record("timing.")
@@ -80,7 +83,7 @@ class Timing:
         require_not_negative(self, "offset", place=_PLACE)
         distribution.require_varying(self, "delay", "delay_jitter", "jitter", place=_PLACE)
         distribution.require_spread(self.jitter_distribution, self.jitter, self.delay_jitter, place=_PLACE)
-        distribution.require_losses(self, self.burst_length, "measurement_loss", "command_loss", place=_PLACE)
+        distribution.require_losses(self, self.burst_length, *LOSSES, place=_PLACE)
         for what in ("noise", "quantisation"):
             for variable, value in getattr(self, what).items():
                 require(is_finite(value) and value >= 0.0, f"{_PLACE}{what} of {variable}", value, "zero or positive")
@@ -112,6 +115,18 @@ def preset_timing(name: str) -> dict[str, Any]:
     if name not in PRESETS:
         raise UsageError(f"preset {name}: {expected_name(name, list(PRESETS))}")
     return dict(PRESETS[name].timing)
+
+
+@contextmanager
+def loss_as_written(written: Collection[str]) -> Iterator[None]:
+    """Of timing keys as `written`, `loss` in errors in place of the losses that it stands for."""
+    try:
+        yield
+    except UsageError as error:
+        for key in LOSSES if "loss" in written else ():
+            if key not in written:
+                error.args = (error.args[0].replace(_PLACE + key, f"{_PLACE}loss"),)
+        raise
 
 
 def range_of(timing: Timing, of: str) -> Range | None:

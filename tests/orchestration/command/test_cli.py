@@ -379,7 +379,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--jitter", "0.02"], "timing.jitter = 0.02: expected less than the period"),
         (["--delay", "late"], "--delay late: expected a number, or a table"),
         (["--delay", "{unifrm=[0,1]}"], "timing.delay.unifrm: no such key; expected one of uniform"),
-        (["--loss", "2"], "timing.measurement_loss = 2.0: expected a probability"),
+        (["--loss", "2"], "timing.loss = 2.0: expected a probability"),
         (["--stop-time", "0"], "stop_time = 0.0: expected a positive number"),
         (["--seed", "-1"], "seed = -1: expected a whole number"),
         (["--noise", "position"], "--noise position: expected NAME=VALUE"),

@@ -425,7 +425,8 @@ def test_what_is_drawn_is_written_as_in_a_system_file_and_is_the_same_there(tmp_
     [
         ("delay = { unifrm = [0, 1] }", "timing.delay.unifrm: no such key; expected one of uniform, normal,"),
         ("delay = { uniform = [1, 0] }", "timing.delay.uniform = [1.0, 0.0]: expected two numbers"),
-        ("loss = { uniform = [0, 1] }", "timing.measurement_loss = a formula: expected a probability, or values"),
+        ("loss = { uniform = [0, 1] }", "timing.loss = a formula: expected a probability, or values"),
+        ("loss = 0.1\nmeasurement_loss = 2", "timing.measurement_loss = 2.0: "),
         ("jitter = { uniform = [0, 0.01] }", "timing.jitter = 0.01: expected less than the period of 0.01 s"),
         ("period = { uniform = [0, 0.01] }", "timing.period = "),
     ],
