@@ -18,8 +18,8 @@ MAX_ROWS = 40
 """Most rows of a table in LaTeX, names above rows among them, as fit on one page"""
 LONG = 12
 """Most letters of a name in a leading column of a table in LaTeX; a longer one stands above its rows"""
-WIDE = 68
-"""Most letters of a row of a table in LaTeX in `footnotesize`, as the page of an article is wide"""
+NARROW, WIDE = 40, 68
+"""Most letters of a row of a table in LaTeX in `footnotesize`, as a column and the page of an article are wide"""
 TABLE = option("--table", "Print the cells with their intervals as a table of that format.", "|".join(FORMATS))
 
 
@@ -58,14 +58,16 @@ def lines(table: PrintedTable, form: str) -> Iterator[str]:
 
 
 def _latex_lines(table: PrintedTable) -> Iterator[str]:
-    """As wide as the page, in one column or two; more than `MAX_ROWS` rows in several tables with one number."""
+    """As wide as the page, or a column if it fits; more than `MAX_ROWS` rows in several tables with one number."""
     count = _leading(table)  # columns that stand above their rows
     heads, rows = table.heads[count:], [row[count:] for row in table.rows]
-    head, size = _latex_head(heads, rows), rf"\{_size(heads, rows)}\setlength{{\tabcolsep}}{{4pt}}"
+    letters, head = _letters(heads, rows), _latex_head(heads, rows)
+    size = rf"\{'footnotesize' if letters <= WIDE else 'scriptsize'}\setlength{{\tabcolsep}}{{4pt}}"
     above = [tuple(row[:count]) for row in table.rows]
+    name = "table" if max([letters, *(len(", ".join(names)) for names in above)]) <= NARROW else "table*"
     starts = _pages(above)
     for start, end in zip(starts, [*starts[1:], len(rows)]):
-        yield r"\begin{table*}  % needs \usepackage{booktabs}"
+        yield rf"\begin{{{name}}}  % needs \usepackage{{booktabs}}"
         yield rf"\centering{size}"
         yield from [rf"\caption{{{_latex(table.caption)}}}"] if start == 0 else _CONTINUED
         yield from [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", *head]
@@ -74,7 +76,7 @@ def _latex_lines(table: PrintedTable) -> Iterator[str]:
                 yield from [] if place == start else [r"\midrule"]
                 yield rf"\multicolumn{{{len(heads)}}}{{l}}{{{_latex(', '.join(above[place]))}}} \\"
             yield _latex_cells([_latex(cell) for cell in rows[place]])
-        yield from [r"\bottomrule", r"\end{tabular}", r"\end{table*}"]
+        yield from [r"\bottomrule", r"\end{tabular}", rf"\end{{{name}}}"]
 
 
 _CONTINUED = (r"\addtocounter{table}{-1}", r"\caption{(continued)}")
@@ -105,10 +107,9 @@ def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
     return [max(map(len, column)) for column in zip(*rows)]
 
 
-def _size(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """The larger of two sizes, if the columns fit on a page in it."""
-    words = [max(head.split(), key=len, default="") for head in heads]
-    return "footnotesize" if sum(_widths([words, *rows])) <= WIDE else "scriptsize"
+def _letters(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
+    """The letters of a row as wide as all columns, whose heads are broken between words."""
+    return sum(_widths([[max(head.split(), key=len, default="") for head in heads], *rows]))
 
 
 def _latex_head(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -146,11 +147,19 @@ def with_interval(value: float, low: float, high: float, decimals: int) -> str:
 
 
 def to_digits(value: float | None, low: float | None, high: float | None, digits: int) -> str:
-    """A number with its interval to some digits; a dash for one that is not known, ? for an end, None or nan both."""
-    ends = [None if end is None or math.isnan(end) else f"{float(f'{end:.{digits}g}'):g}" for end in (value, low, high)]
-    if ends[0] is None:
+    """A number to some digits with its interval to as many decimals, or digits where these are large or small numbers.
+
+    A dash for one that is not known, ? for an end, None or nan both.
+    """
+    known = [None if end is None or math.isnan(end) else end for end in (value, low, high)]
+    if known[0] is None:
         return "-"
-    return ends[0] if ends[1] is ends[2] is None else f"{ends[0]} [{ends[1] or '?'}, {ends[2] or '?'}]"
+    size = abs(known[0]) or max((abs(end) for end in known if end), default=1.0)
+    decimals = max(0, digits - 1 - math.floor(math.log10(size))) if 1e-4 <= size < 1e6 else None
+    ends = [
+        None if end is None else f"{end:.{digits}g}" if decimals is None else _signed(end, decimals) for end in known
+    ]
+    return f"{ends[0]}" if ends[1] is ends[2] is None else f"{ends[0]} [{ends[1] or '?'}, {ends[2] or '?'}]"
 
 
 def decimals_of(count: int) -> int:

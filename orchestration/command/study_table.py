@@ -89,12 +89,11 @@ def study_table(study: Study, store: Path, metric: str = GOOD, at: Sequence[str]
         caption += f"; at {place_of(study, chosen, units)}"
     if cells["low"].isna().any():
         caption += "; no interval where nothing is random" + ("" if is_share else ", or runs are too few")
-    numbers = (
-        cells.astype(object)
-        .where(cells.notna(), None)
-        .rename(columns={GOOD: metric if is_share else GOOD})
-        .to_dict("records")
-    )
+    table = cells.rename(columns={GOOD: metric}) if is_share else cells
+    if laws is not None:  # in the rows of the second law, as in the file of differences
+        ends = found.rename(columns={end: f"difference_{end}" for end in ("low", "high")})
+        table = table.merge(ends.assign(**{laws.axis: laws.second, "minus": laws.first}), how="left", on=list(names))
+    numbers = table.astype(object).where(table.notna(), None).to_dict("records")
     return PrintedTable(caption=caption, heads=[*columns], rows=[*zip(*columns.values())], numbers=numbers)
 
 

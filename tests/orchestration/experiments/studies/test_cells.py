@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 import quadcosim
 from orchestration.command import study_table
-from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, decimals_of, lines, with_interval
+from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, decimals_of, lines, to_digits, with_interval
 from orchestration.experiments.studies import cell_figures, drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
@@ -93,7 +93,7 @@ def test_good_runs_without_the_metric_are_left_out_and_counted_as_such_in_map_li
     table = table.assign(position_rmse=table["position_rmse"].mask(lacks))
     medians = medians_of(table, names, "position_rmse")
     assert medians[["good", "with_value"]].to_numpy().tolist() == [[0, 0], [3, 0], [6, 5], [0, 0], [0, 0], [0, 0]]
-    assert study_table._medians(medians, "median", "with_value")[:3] == ["-", "- (0 of 3)", "3 (5 of 6)"]
+    assert study_table._medians(medians, "median", "with_value")[:3] == ["-", "- (0 of 3)", "3.00 (5 of 6)"]
     one_law = axis("controller", "CascadedController")
     figure = cell_maps(table, (PERIODS, LOSSES), one_law, "position_rmse", WORDS, units={})
     assert [text.get_text() for text in figure.axes[0].texts] == ["5"]
@@ -322,7 +322,9 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     of_medians = pd.read_csv(tmp_path / "results/study/differences_position_rmse.csv")
     assert list(of_medians)[3:] == ["pairs", "difference", "low", "high", "unit"]
     printed = main("export", "study.toml", "--format", "csv", "--metric", "diverged", "--table", "csv").stdout
-    assert printed.splitlines()[0] == "controller,timing.period,count,diverged,share,low,high"
+    columns = "controller,timing.period,count,diverged,share,low,high"
+    assert printed.splitlines()[0] == f"{columns},difference,difference_low,difference_high,minus"
+    assert printed.splitlines()[-1] == "CascadedController,0.02,1,0,0.0,,,0.0,,,UnifiedController"
     of_diverged = pd.read_csv(tmp_path / "results/study/differences_diverged.csv")
     assert list(of_diverged)[3:] == ["difference", "low", "high"]
     main("draw", "study.toml", "--metric", "diverged", "--out", "figures", "--format", "png")
@@ -360,6 +362,21 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert "expected at least one finished run" in main("draw", "study.toml", code=2).stderr
 
 
+def test_a_median_and_the_ends_of_its_interval_have_equal_decimals() -> None:
+    assert to_digits(5.87, 5.83, 6.0, 3) == "5.87 [5.83, 6.00]"
+    assert to_digits(5.0, 2.14, None, 3) == "5.00 [2.14, ?]"
+    assert to_digits(0.0, -0.1, 0.25, 3) == "0.000 [-0.100, 0.250]"
+    assert to_digits(2.5e7, 1e7, 3e7, 3) == "2.5e+07 [1e+07, 3e+07]"
+
+
+def test_a_table_that_fits_into_a_column_of_two_is_as_wide_as_it() -> None:
+    def begun(width: int) -> str:
+        return next(lines(PrintedTable(caption="", heads=["a", "b"], rows=[["1", "2" * width]], numbers=[]), "latex"))
+
+    assert begun(39).startswith(r"\begin{table} ")
+    assert begun(40).startswith(r"\begin{table*} ")
+
+
 def test_a_small_end_of_an_interval_keeps_its_sign() -> None:
     ends = pd.DataFrame({"share": [0.1, -1e-17], "low": [-0.0041, 0.0], "high": [0.256, 0.3]})
     assert study_table._texts(ends, "share", 2) == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
@@ -384,7 +401,7 @@ def test_a_long_name_of_several_rows_stands_above_them_instead_of_in_a_column() 
         r"\begin{tabular}{ll}", r"\toprule", r"period & share \\", r"\midrule",
         r"\multicolumn{2}{l}{unified law, tuned} \\", r"10 & 0.50 \\", r"20 & 0.50 \\", r"\midrule",
         r"\multicolumn{2}{l}{cascade} \\", r"10 & 0.50 \\", r"20 & 0.50 \\",
-        r"\bottomrule", r"\end{tabular}", r"\end{table*}",
+        r"\bottomrule", r"\end{tabular}", r"\end{table}",
     ]  # fmt: skip
 
 
@@ -397,7 +414,7 @@ def test_a_table_of_more_rows_than_a_page_has_is_several_with_one_number_and_its
         r"\caption{Many}", r"\multicolumn{2}{l}{loss, unified law, tuned} \\", r"\multicolumn{2}{l}{loss, cascade} \\",
         r"\addtocounter{table}{-1}", r"\caption{(continued)}", r"\multicolumn{2}{l}{loss, cascade} \\",
     ]  # fmt: skip
-    assert text.count(r"run & share \\") == text.count(r"\end{table*}") == 2
+    assert text.count(r"run & share \\") == text.count(r"\end{table}") == 2
 
 
 def test_a_study_that_cannot_be_drawn_as_cells_says_what_is_expected() -> None:
