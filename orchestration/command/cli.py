@@ -28,8 +28,12 @@ from orchestration.foundation.processes.subprocesses import misleading_variables
 
 NO_THREAD = "can't start new thread"
 """Text of the error of Python if the system has no room for another one"""
-_SYNONYMS = {"--store": "--out"}
-"""Options that some commands take, by those of others for the same"""
+_SYNONYMS = {
+    "--store": "--out", "--step-size": "--output-interval", "--start-values": "--set", "--output-variables": "--record",
+    "--input-file": "--inputs", "--output-file": "--output", "--relative-tolerance": "--tolerance",
+    "--interface-type": "--interface",
+}  # fmt: skip
+"""Options that some commands take, by those of others, or of fmpy, for the same"""
 
 
 class _Interrupted(Exception):

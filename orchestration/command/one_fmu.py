@@ -68,7 +68,8 @@ class OneFmuFlags:
 
     def applied_to(self, path: Path, flags: FlightFlags) -> "System":
         """The FMU at `path` alone, with these flags and those of any system; `--set` has the names of the FMU."""
-        from orchestration.simulation.requests.one_fmu import alone, late_jump, remarks
+        from orchestration.components.fmi.read_description import read_model
+        from orchestration.simulation.requests.one_fmu import alone, late_jump, outputs, remarks
 
         solver = _chosen("solver", self.solver, SOLVERS)
         interface = _chosen("interface", self.interface, _ALONE) or ("model-exchange" if solver else None)
@@ -77,6 +78,8 @@ class OneFmuFlags:
             tolerance=self.tolerance, inputs=self.inputs, record=self.record or (),
             parameters=assigned("set", flags.set), interface=interface, solver=solver,
         )  # fmt: skip
+        if self.output is not None and not self.record and not outputs(read_model(path)):
+            raise UsageError(f"--output: {path} has no outputs to write: expected --record NAME")
         for remark in remarks(system, is_default_end=flags.stop_time is None):
             inform(remark)
         if late := late_jump(system):

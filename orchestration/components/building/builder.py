@@ -22,7 +22,7 @@ from fmu_kit.discovery import slave_beside, slaves_in
 from fmu_kit.new_files import write_atomically
 from fmu_kit.variants import Variant
 from orchestration.components.building import consent
-from orchestration.components.building.models import MODELS
+from orchestration.components.building.models import MODELS, WRAPPED
 from orchestration.components.fmi import trust
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.records import Scalar
@@ -136,8 +136,18 @@ def slaves_of(folder: Path) -> list[Target]:
         raise UsageError(f"{folder}: expected a folder with modules that define slaves")
     slaves = translating_errors(slaves_in, folder)
     if not slaves:
+        if described := [path for path in sorted(folder.glob(f"*{WRAPPED}")) if _describes_c(path)]:
+            raise UsageError(f"{folder}: this is C already, of which an FMU is made by quadcosim wrap {described[0]}")
         raise UsageError(f"{folder}: expected a module with a subclass of fmu_kit.slave.Slave that has a description")
     return slaves
+
+
+def _describes_c(path: Path) -> bool:
+    from orchestration.components.building import wrap  # not before: loads what reads such files
+
+    with contextlib.suppress(UsageError):
+        return bool(wrap.load(path).sources)
+    return False
 
 
 def slaves_named(text: str) -> list[Target]:

@@ -31,7 +31,7 @@ from orchestration.components.fmi.archive import (
 )
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD
 from orchestration.foundation.basics.documents import readable
-from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, no_utf8
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, no_utf8, shown
 from orchestration.foundation.basics.unit_algebra import BaseUnits, Unit, named
 from orchestration.foundation.processes.resource_limits import ELEMENTS
 
@@ -39,6 +39,15 @@ Kind = Literal["Real", "Integer", "Boolean", "Enumeration", "String", "Binary", 
 """Types by their FMI 2.0 names; FMI 3.0's Float64 is a Real, its Int32 an Integer"""
 NUMERIC: tuple[Kind, ...] = ("Real", "Integer", "Boolean", "Enumeration")
 """Types that can be connected and recorded: as numbers, a Boolean as 0 or 1"""
+
+ENUMERATED = {
+    "causality": (
+        "parameter", "calculatedParameter", "input", "output", "local", "independent", "structuralParameter",
+    ),
+    "variability": ("constant", "fixed", "tunable", "discrete", "continuous"),
+    "initial": ("exact", "approx", "calculated"),
+}  # fmt: skip
+"""Attributes of variables, and the values that FMI 2.0 and 3.0 have for them"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -362,6 +371,8 @@ def read_description(path: Path) -> ModelDescription:
         from orchestration.components.fmi.fmi1_description import completed  # not before: few FMUs are of FMI 1.0
 
         completed(description, read_root(read_archive(path, math.inf)), path)
+    else:
+        _expect_enumerated(description, path)
     offered = declared_of(description)
     if not offered:
         raise UsageError(f"{path}: offers no interface; expected co-simulation, model exchange or scheduled execution")
@@ -371,6 +382,18 @@ def read_description(path: Path) -> ModelDescription:
         if value is None:
             raise UsageError(f"{path}: its modelDescription.xml has no {name}")
     return description
+
+
+def _expect_enumerated(description: ModelDescription, path: Path) -> None:
+    """Raise `UsageError` for a value that FMI's enumerations do not have: the variable would be, say, no output."""
+    for declared in description.modelVariables:
+        for name, known in ENUMERATED.items():
+            value = getattr(declared, name)
+            if value is not None and value not in known:
+                line = f"modelDescription.xml, line {declared.sourceline}"
+                raise UsageError(
+                    f"{path}: {line}: {declared.name}: {name} = {shown(value)}: expected one of {', '.join(known)}"
+                )
 
 
 def declared_of(description: ModelDescription) -> dict[Interface, Any]:

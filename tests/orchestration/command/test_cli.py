@@ -390,6 +390,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--set", "plant.mass"], "--set plant.mass: expected NAME=VALUE"),
         (["--set", "plant.mass=heavy"], "plant.mass = heavy: expected a number"),
         (["--set", "plant.mas=1"], "did you mean mass?"),
+        (["--step-size", "0.1"], "No such option: --step-size; did you mean --output-interval?"),
         (["--set", "controller.fmu="], "expected a parameter; set the FMU by --controller NAME|PATH"),
         (["--plant", "nowhere.fmu"], "plant.fmu"),
         (["--set", "controller.sample_period=0.1"], "controller.sample_period: expected --period and --clock instead"),

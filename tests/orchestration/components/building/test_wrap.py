@@ -13,7 +13,7 @@ import pytest
 
 from fmu_kit.compiler.pack import wrapping
 from fmu_kit.compiler.pack.user_objects import RefusedCodeError
-from orchestration.components.building import wrap
+from orchestration.components.building import builder, wrap
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
@@ -458,6 +458,13 @@ def test_what_is_wrong_with_a_task_has_its_line(task: str, expected: str, tmp_pa
     with pytest.raises(UsageError, match=re.escape(expected)) as raised:
         wrap.build(file, wrap.fmu_of(file))
     assert str(file) in str(raised.value)
+
+
+@pytest.mark.parametrize("place", ["", "tasks.toml"])
+def test_what_makes_c_of_python_says_that_code_in_c_is_c_already(place: str, tmp_path: Path) -> None:
+    (tmp_path / "tasks.toml").write_text(TASKS)
+    with pytest.raises(UsageError, match=r"this is C already, .* by quadcosim wrap .*tasks\.toml$"):
+        builder.slaves_named(str(tmp_path / place))
 
 
 def _output(fmu: Path, inputs: dict[str, float]) -> float:

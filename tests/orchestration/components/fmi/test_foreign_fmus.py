@@ -121,6 +121,11 @@ def test_a_source_that_a_type_does_not_hold_is_refused(engine: Any, tmp_path: Pa
         ("<CoSimulation", "<Other", "offers no interface; expected co-simulation, model exchange or sch"),
         ('fmiVersion="2.0"', 'fmiVersion="3.1"', "fmiVersion = 3.1: expected 1.0, 2.0 or 3.0"),
         ('valueReference="1"', 'valueReference="-1"', "y: valueReference = -1: expected a whole number of 32 bits"),
+        (
+            'causality="output"',
+            'causality="outputt" initial="exact"',
+            ": causality = outputt: expected one of parameter, calculatedPar",
+        ),
         ('"Mode" start="1"', '"Mode" start="one"', "components.it.parameters.mode = one: expected a start value"),
     ],
 )
