@@ -177,7 +177,11 @@ def cell_maps(
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
     excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
-    said = [_repetitions(found, metric), f"dots: {excludes} excludes 0" if both is not None else "", left_out]
+    said = [
+        _repetitions(found, metric),
+        f"+ and −: sign of the difference; dots: {excludes} excludes 0" if both is not None else "",
+        left_out,
+    ]
     style.set_title(figure, "; ".join(filter(None, said)) if said[0] or left_out else "")
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):

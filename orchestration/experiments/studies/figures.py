@@ -170,6 +170,8 @@ def good_runs(table: "pd.DataFrame") -> "pd.Series":
 
 def add_note(figure: Figure, note: str | None, style: Style) -> None:
     """Write a note above a figure, below its title; a paper has its caption for both."""
+    if note is not None:
+        figure.set_label("; ".join(filter(None, (str(figure.get_label()), *note.split("\n")))))
     if note is not None and style.has_titles:
         figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), note))), size="medium")
 

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from fmu_kit.new_files import new_file, new_files
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.terminal import Share
+from orchestration.foundation.basics.terminal import Share, inform
 from orchestration.simulation.figures.names import COLUMNS, FORMATS, WRITTEN
 from orchestration.simulation.figures.palette import CYCLE
 
@@ -80,7 +80,8 @@ class Style:
         return figure
 
     def set_title(self, figure: Figure, text: str) -> None:
-        """Put a text above all panels, broken into lines that fit the width; a paper has none."""
+        """Put a text above all panels, in lines that fit the width; a paper has it as a caption, told by `save`."""
+        figure.set_label(text)
         if self.has_titles:
             figure.suptitle(textwrap.fill(text, max(20, round(self.width / (0.55 * self.font * POINT)))))
 
@@ -174,6 +175,9 @@ def save(
                             _reduce(path, style.colors)
                     written.append(folder / file)
                     progress(len(written) / (len(figures) * len(style.formats)))
+    for name, figure in figures.items():
+        if figure.get_label() and not style.has_titles:
+            inform(f"{name}: {figure.get_label()}")
     return written
 
 

@@ -219,8 +219,9 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     assert shown == {(10.0, 0.0), (10.0, 0.1), (20.0, 0.0), (20.0, 0.1), (20.0, 0.2)}  # 8 and 6 of 8 may be alike
     assert [text.get_text() for text in figure.axes[1].texts] == ["0/8", "3/8", "6/8", "0/8", "0/8", "0/8"]
     assert [text.get_text() for text in figure.axes[2].texts] == ["−"] * 6, "the second law is worse everywhere"
-    assert figure.get_suptitle() == (
-        "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; dots: Newcombe's for pairs excludes 0"
+    assert figure.get_label() == (
+        "8 runs a cell; Wilson intervals at 95 % up to 0.56 wide; + and −: sign of the difference; "
+        "dots: Newcombe's for pairs excludes 0"
     )
 
 
@@ -286,7 +287,9 @@ def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     low, high = medians_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[0, ["low", "high"]]
     assert first[:, 1].tolist() == [low, high], "the interval of the first place"
     assert not figure.get_suptitle()
-    assert not cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=STYLES["paper"]).get_suptitle()
+    figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=STYLES["paper"])
+    assert not figure.get_suptitle()
+    assert str(figure.get_label()).startswith("8 runs a cell; "), "its caption"
 
 
 def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
