@@ -61,6 +61,11 @@ def quadrotor(**settings: Any) -> "Environment":
 
 def quadrotor_vector(num_envs: int = 1, **settings: Any) -> "VectorEnvironment":
     """What `gymnasium.make_vec` makes of `quadcosim/Quadrotor-v0`."""
+    if "autoreset_mode" in settings:
+        from gymnasium.vector import AutoresetMode
+
+        if (mode := settings.pop("autoreset_mode")) != AutoresetMode.NEXT_STEP:
+            raise UsageError(f"autoreset_mode = {mode}: expected NEXT_STEP; vectorization_mode='sync' takes the others")
     many: VectorEnvironment = __getattr__("VectorEnvironment")(num_envs=num_envs, **_flight(settings))
     return many
 

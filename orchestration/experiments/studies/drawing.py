@@ -18,7 +18,7 @@ from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.table import frame, note_in, place_of, rows_at, units_in
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share, warn
 from orchestration.simulation.figures.style import SCREEN, Style, save
@@ -33,7 +33,8 @@ def expect_metric(study: Study, metric: str | None) -> None:
     """Raise `UsageError` for an unknown metric."""
     known = [name for name in metrics_with(study.metric_names) if name not in TEXTS or _is_screened(study)]
     if metric is not None and metric not in known:
-        raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome")
+        near = did_you_mean(metric, known)
+        raise UsageError(f"metric {metric}: expected one of {', '.join(known)}; every figure shows the outcome{near}")
 
 
 def draw_study(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, prefixed
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
 from orchestration.quadrotor.scenarios.wiring import EXTERNAL_FORCE, POSITION_REFERENCE
@@ -181,6 +181,7 @@ def paths_of(target: str) -> tuple[str, ...]:
     raise UsageError(
         f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, stop_time, "
         f"timing.loss, timing.noise.NAME, timing.quantisation.NAME or timing.KEY with KEY one of {', '.join(_SINGLE)}"
+        + did_you_mean(target, [f"timing.{name}" for name in ("loss", *_SINGLE)])
     )
 
 

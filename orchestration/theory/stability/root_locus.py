@@ -96,6 +96,9 @@ class RootLocus:
     in_double: tuple[str, ...] = ()
     """The components whose float code in C is taken in double precision."""
 
+    def __repr__(self) -> str:
+        return f"<RootLocus: {self.verdict}>"
+
     @property
     def verdict(self) -> str:
         """Where poles leave the unit circle and return, or that they do not."""

@@ -65,6 +65,9 @@ class Step:
     in_double: tuple[str, ...] = ()
     """The components whose float code in C is taken in double precision."""
 
+    def __repr__(self) -> str:
+        return f"<Step: {self.verdict}>"
+
     @property
     def verdict(self) -> str:
         """How long the slowest loop takes, and what it takes back."""

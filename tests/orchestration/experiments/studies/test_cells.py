@@ -316,8 +316,9 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert drawn == ["figures/good.png"]
     of_store = ("--store", "results/study/study.sqlite")
     main("draw", "study.toml", *of_store, "--metric", "position_rmse", "--out", "figures", "--format", "png")
-    error = main("export", "study.toml", "--metric", "postion_rmse", code=2).stderr
-    assert "did you mean position_rmse?" in error
+    for command in ("export", "draw"):
+        error = main(command, "study.toml", "--metric", "postion_rmse", code=2).stderr
+        assert "did you mean position_rmse?" in error
     main("export", "study.toml", "--format", "csv", "--metric", "position_rmse")
     medians = pd.read_csv(tmp_path / "results/study/medians_position_rmse.csv")
     assert list(medians)[2:] == ["good", "with_value", "median", "low", "high", "unit"]

@@ -15,6 +15,7 @@ from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+from orchestration.quadrotor.scenarios.translation import paths_of
 from orchestration.simulation.requests.ranges import unit_at
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
@@ -260,6 +261,12 @@ def test_an_unknown_target_is_reported_with_the_known_ones(tmp_path: Path, targe
     line = refused(tmp_path, f'[[axes]]\nname = "x"\nsets = ["{target}"]\nvalues = [1]\n')
     assert f"{target}: expected controller.NAME, plant.NAME, reference.NAME, disturbance.NAME, seed, " in line
     assert ", ".join(key for key in TIMING_KEYS if key not in ("noise", "quantisation")) in line
+
+
+@pytest.mark.parametrize("target", ["timing.perod", "period"])
+def test_of_an_unknown_target_the_closest_is_named(target: str) -> None:
+    with pytest.raises(UsageError, match=r"; did you mean timing.period\?$"):
+        paths_of(target)
 
 
 @pytest.mark.parametrize(

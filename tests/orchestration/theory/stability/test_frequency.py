@@ -342,3 +342,4 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     peak = 20.0 * np.log10(loop.sensitivity_peak)
     assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == pytest.approx(peak)
     assert repr(bode_of("dc_servo")) == f"<Bode: {document['verdict']}>"
+    assert repr(step_of("dc_servo")) == f"<Step: {step_of('dc_servo').verdict}>"
