@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -257,12 +258,12 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Sh
         family = timeline.family(run=run)
         broken = breaking_at(family, run, run + LONGEST_SEQUENCE // 2)
         if broken is not None:
+            broken = replace(broken, value=longest_run(broken.sequence))
             break
         families.append(family)
     value, certificate, not_sought = None, None, not_sought_for(timeline.family(run=most))
-    for run, family in reversed(
-        [] if not_sought else [*enumerate(families)]
-    ):  # a proof for a run is one for all shorter ones
+    stable = [] if not_sought else [*enumerate(families if broken is None else families[: int(broken.value)])]
+    for run, family in reversed(stable):  # a proof for a run is one for all shorter ones
         progress(1.0 - 0.5 * (run + 1) / (most + 1))
         found = find_certificate(family, [varying.path])
         if found is not None:
@@ -273,6 +274,12 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Sh
         breaking_sequence=() if broken is None else broken.sequence, largest=most,
         searched=searched, states=len(timeline.family(run=most).kept), certificate=certificate, not_sought=not_sought,
     )  # fmt: skip
+
+
+def longest_run(sequence: Sequence[tuple[str, tuple[float, ...]]]) -> int:
+    """The most messages in a row that a repeated sequence of letters loses: it may lose fewer than it might."""
+    lost = [name.startswith("lost") for name, _ in sequence]
+    return max((len([*run]) for is_lost, run in groupby([*lost, *lost]) if is_lost), default=0)
 
 
 def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:

@@ -20,7 +20,14 @@ from orchestration.theory.certificates.breaking import breaking_at
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.check_file import check_certificate
 from orchestration.theory.certificates.find_certificate import find_certificate, parts_of
-from orchestration.theory.certificates.margin import Certified, linear_loop_of, margin, small_gain, varying_of
+from orchestration.theory.certificates.margin import (
+    Certified,
+    linear_loop_of,
+    longest_run,
+    margin,
+    small_gain,
+    varying_of,
+)
 from orchestration.theory.certificates.region import margin_region
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.certificates.verify_certificate import verified
@@ -142,6 +149,14 @@ def test_runs_of_losses_are_certified_up_to_the_one_that_breaks(system: System, 
     assert [name for name, _ in lost.breaking_sequence] == ["lost", "lost", "arrives"]
     proof = check_certificate(lost.save(tmp_path / "lost.json"), faster)
     assert proof.runs == {"arrives": None, "lost": 1}
+
+
+def test_a_sequence_breaks_a_loop_with_the_longest_run_of_losses_that_it_has() -> None:
+    """Fewer than it might lose, and of a sequence that is repeated also from its end to its begin."""
+    given = [("lost", ()), ("arrives", ()), ("lost in part 1", ()), ("lost in part 2", ())]
+    assert longest_run([*given, ("arrives", ())]) == 2
+    assert longest_run(given) == 3
+    assert longest_run(given[1:2]) == 0
 
 
 def test_a_small_gain_bound_beyond_what_is_certified_is_in_the_verdict() -> None:
