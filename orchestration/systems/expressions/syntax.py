@@ -250,7 +250,10 @@ def _node(tree: ast.expr, text: str, depth: int) -> Node:
         case ast.Call(func=ast.Name(id="response" | "missed" as what), args=[task], keywords=[]):
             return JobMeasure(what, _dotted(task, text))
         case ast.Call(func=ast.Name(id=function), keywords=[]):
-            return Call(_checked_name(function, len(tree.args), text), tuple(map(build, tree.args)))
+            arguments = tuple(map(build, tree.args))
+            if function == "integral" and isinstance(arguments[0] if arguments else None, Sampled):
+                raise UsageError(f"{_short(text)}: samples have no integral; expected integral of the signal itself")
+            return Call(_checked_name(function, len(arguments), text), arguments)
     raise UsageError(
         f"{_short(text)}: {_short(ast.unparse(tree))} is not part of the language; expected numbers, names, "
         "+ - * / **, comparisons, and, or, not, and functions"

@@ -41,6 +41,11 @@ def test_a_name_of_other_characters_is_in_quotes():
     assert not names_job_measure("ball.der(h)")
 
 
+def test_samples_have_no_integral():
+    with pytest.raises(UsageError, match=r"^integral\(sampled\(c, a.x\)\): samples have no integral"):
+        parse("integral(sampled(c, a.x))")
+
+
 def test_sampled_names_a_connection_not_a_signal():
     tree = parse("rms(sampled(measurement, controller.e))")
     assert tree == Call("rms", (Sampled("measurement", Name("controller.e")),))

@@ -50,7 +50,10 @@ MORE = {
 }
 
 
-EVERY = {f"{name}_{kind}": of_signal(name, x) for kind, x in X.items() for name in REDUCTIONS} | MORE
+EVERY = {
+    f"{name}_{kind}": of_signal(name, x)
+    for kind, x in X.items() for name in REDUCTIONS if name != "integral" or not x.startswith("sampled")
+} | MORE  # fmt: skip
 
 
 def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_path: Path) -> None:
