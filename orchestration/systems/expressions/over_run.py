@@ -70,7 +70,9 @@ def unknown(name: str) -> UsageError:
 
 def alone(connection: str) -> UsageError:
     """The error for samples of a connection that are not reduced to a number."""
-    return UsageError(f"sampled({connection}, …): expected inside a reduction, as max, mean, rms, share or growth_share")
+    return UsageError(
+        f"sampled({connection}, …): expected inside a reduction, as max, mean, rms, share or growth_share"
+    )
 
 
 def vectors(signals: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
