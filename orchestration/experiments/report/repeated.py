@@ -40,7 +40,7 @@ class RunsInCells:
 
 
 def runs_in_cells(study: Study | None, rows: Sequence[Row], axes: Sequence[ColumnAxis]) -> RunsInCells | None:
-    """The runs of a study that repeats over two axes of numbers, or over one and one of names; None of other studies.
+    """The runs of a study that repeats over two of these axes of numbers, or over one and one of names; else None.
 
     An axis of names beside two of numbers is that of the laws.
     """
@@ -52,9 +52,9 @@ def runs_in_cells(study: Study | None, rows: Sequence[Row], axes: Sequence[Colum
     if any(axis.values is None for axis in study.axes):
         return None
     known = {axis.name: axis for axis in axes}
-    numeric = [axis.name for axis in study.cell_axes if all(map(is_number, axis.values or ()))]
+    numeric = [axis.name for axis in study.cell_axes if axis.is_numeric]
     named = [name for name in names if name not in numeric]
-    if (len(numeric), len(named)) not in ((2, 0), (2, 1), (1, 1)):
+    if (len(numeric), len(named)) not in ((2, 0), (2, 1), (1, 1)) or not known.keys() >= {*names}:
         return None
     columns = ("status", "good", "design_index")
     table = pd.DataFrame([{**row["settings"], **{name: row[name] for name in columns}} for row in rows])

@@ -1,7 +1,8 @@
 """The effects of events in a simulated loop: held noise, steps of components, means over the rows of the run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from orchestration.theory.exact.effects import LoopEffects, Places
 from orchestration.theory.exact.flows import Flows
 from orchestration.theory.exact.objectives import Mean
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, exact_seconds
-from orchestration.theory.stability.matrices import Components, Continuous
+from orchestration.theory.stability.matrices import Continuous
 
 
 class SimulatedEffects(LoopEffects):
@@ -23,24 +24,21 @@ class SimulatedEffects(LoopEffects):
 
     holds_wires = True
 
-    def __init__(
-        self,
-        system: System,
-        components: Components,
-        tasks: Sequence[str],
-        *,
-        with_means: bool = False,
-        steps: Mapping[str, float] | None = None,
-    ) -> None:
-        """Each value of noise is held for the period of its source."""
-        self.noise = [name for name, source in system.sources.items() if source.noise]
-        super().__init__(system, components, tasks, with_means=with_means, steps=steps)
-        self._plan = Plan(system)
-        self._flows = {
-            name: Flows(*_with_held_inputs(part)) for name, part in self.continuous.items() if part.unfit is None
-        }  # fmt: skip
-        self._means: Sequence[Mean] = ()
-        self._maps: dict[int, tuple[Floats, Floats]] = {}
+    _means: Sequence[Mean] = ()
+
+    @cached_property
+    def noise(self) -> list[str]:
+        """The sources of noise, each value of which is held for the period of its source."""
+        return [name for name, source in self.system.sources.items() if source.noise]
+
+    @cached_property
+    def _flows(self) -> dict[str, Flows]:
+        return {name: Flows(*_with_held_inputs(part)) for name, part in self.continuous.items() if part.unfit is None}
+
+    @cached_property
+    def _maps(self) -> dict[int, tuple[Floats, Floats]]:
+        """Those of known durations."""
+        return {}
 
     def _add_more_places(self, places: Places) -> None:
         for name, part in self.continuous.items():

@@ -64,7 +64,8 @@ class LoopEffects(ABC):
         """
         self.system, self.parts, self.tasks = system, components, list(tasks)
         self.places = places = Places()
-        self.wires = {system.connections[i].name for i in Plan(system).wires}
+        self._plan = Plan(system)
+        self.wires = {system.connections[i].name for i in self._plan.wires}
         self.fed_by = {end: (x, j) for x in system.connections for j, end in enumerate(x.end)}
         self.continuous = {n: c for n, c in components.items() if isinstance(c, Continuous)}
         self.sampled_parts = {n: c for n, c in components.items() if isinstance(c, SampledSystem)}

@@ -190,9 +190,10 @@ class Tangent(LinearSimulator):
             move = np.zeros(len(self.inputs))
             move[i::several] = 0.5 * excitation.pulses[i::several]
             predicted, state = np.zeros((steps, cut)), np.zeros(len(self.state))
-            for k in range(steps):
-                after = by_state @ state + by_input @ move
-                predicted[k], state = after[:cut], after[cut:]
+            with np.errstate(over="ignore", invalid="ignore"):  # beyond what is compared
+                for k in range(steps):
+                    after = by_state @ state + by_input @ move
+                    predicted[k], state = after[:cut], after[cut:]
             known = 2.0 * np.abs(predicted[:first]).max(axis=0, initial=0.0)
             beyond = np.flatnonzero((np.abs(predicted[first:]) > known).any(axis=1))
             count = first + int(beyond[0]) if len(beyond) else steps

@@ -89,6 +89,12 @@ def test_two_studies_have_their_own_maps_and_the_difference_of_both_in_pairs_of_
     assert maps_of_both(("a", None), ("b", None)) is None
 
 
+def test_a_study_over_axes_that_another_lacks_has_no_runs_in_its_cells() -> None:
+    chosen = study(PERIODS, LOSSES, SEEDS, repeat="seed")
+    other = [ColumnAxis(name=each.name, quantity=quantity_of(each, {})) for each in (PERIODS, SEEDS)]
+    assert runs_in_cells(chosen, [], other) is None
+
+
 def test_two_studies_of_two_laws_have_a_difference_of_each_and_unpaired_seeds_count_less() -> None:
     laws = replace(LAWS, name="law", targets=("controller",))
     first, second = (
