@@ -66,8 +66,8 @@ def study_table(study: Study, store: Path, metric: str = GOOD, at: Sequence[str]
     else:
         texts = partial(_medians, column="median", count=WITH_VALUE)
         title = labels.metric_with_unit(metric, units.get(metric))
-        caption = f"Median of {title} over the {word} runs of each cell, with 95 % intervals of order statistics"
-        caption += " and, in parentheses, their number"
+        caption = f"Median of {title} over the {word} runs of each cell that have a value, with 95 % intervals of "
+        caption += "order statistics and, in parentheses, their number"
         if left_out := without_value(cells):
             caption += f"; {left_out}"
     if laws is None:

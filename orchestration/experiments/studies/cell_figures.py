@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from orchestration.experiments.studies.axes import SCALES, Axis, name_of, quantity_of
+from orchestration.experiments.studies.figures import mark_edge
 from orchestration.experiments.studies.shares import (
     GOOD,
     WITH_VALUE,
@@ -25,6 +26,7 @@ from orchestration.experiments.studies.shares import (
 )
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
+from orchestration.simulation.figures.lines import abreast
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -41,6 +43,7 @@ MAX_TICKS = 108, 12
 """Most letters of the ticks below a row of panels, and most ticks beside a panel"""
 MAX_PANELS = 9
 """Most values of a third axis of numbers: a map for each, three in a row"""
+_NO_VALUE = "no value"
 OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{} • −"
 """Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
 
@@ -57,7 +60,8 @@ def cell_lines(
 ) -> Figure:
     """The share of good runs, or the median of a metric, with its interval at 95 %, over one axis.
 
-    `laws` is an axis of names, such as controllers: a line for each.
+    `laws` is an axis of names, such as controllers: a line for each. Crosses at the lower edge are values without a
+    median.
     """
     across = quantity_of(axis, units)
     figure = style.figure(32.0)
@@ -67,6 +71,8 @@ def cell_lines(
     shown = found if metric == GOOD else medians_of(table, names, metric)
     column = "share" if metric == GOOD else "median"
     groups = _by_value(shown, laws, units)
+    lacking: dict[str | tuple[float, ...], Floats] = {}
+    lacks = []
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
@@ -80,6 +86,9 @@ def cell_lines(
                     f"{count}", (place, value), (3.0, -3.0), textcoords="offset points", va="top", fontsize="x-small",
                     color=how["color"], path_effects=[withStroke(linewidth=1.5, foreground="white")],
                 )  # fmt: skip
+            if len(without := group.loc[group[WITH_VALUE] == 0, axis.name]):
+                lacking[how["color"]] = across.of(without)
+                lacks.append(f"{f'by {law} ' if law else ''}at {', '.join(map(across.text_of, without))}")
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
     panel.set(
@@ -89,12 +98,17 @@ def cell_lines(
     )
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
-    if laws is not None:
-        place = "outside right upper" if style.is_wide else "outside lower center"
-        figure.legend(loc=place, title=name_of(laws), ncols=1 if style.is_wide else len(groups))
+    if lacking:
+        mark_edge(panel, lacking, "x", low=True)
+        panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
+    if laws is not None or lacking:
+        names = [*(law for law, _ in groups), *([_NO_VALUE] if lacking else [])]
+        title = None if laws is None else name_of(laws)
+        figure.legend(loc="outside lower center", title=title, ncols=abreast(names, style))
     said = [_repetitions(found, metric)]
     if said[0] and metric != GOOD:
         said += ["bars: 95 % intervals of order statistics, where runs suffice", without_value(shown)]
+    said += [f"crosses: no {words[0]} run with a value {' and '.join(lacks)}"] if lacks else []
     style.set_title(figure, "; ".join(filter(None, said)))
     return figure
 
@@ -164,7 +178,9 @@ def cell_maps(
                 "median difference", units.get(metric) or labels.METRICS.get(metric, ("", None))[1]
             )
             of += ",\nnumber of pairs" if has_room[MARKED] and repeats else ""
-        _difference(figure, panels[2], places, axes, (x, y), of_pairs, of, writes=has_room[MARKED] and repeats)
+        unpaired = _difference(
+            figure, panels[2], places, axes, (x, y), of_pairs, of, writes=has_room[MARKED] and repeats
+        )
         panels[2].set_title(f"{groups[1][0]}\nminus {groups[0][0]}")
     for panel in panels[:count]:
         panel.set(xscale=x.scale, yscale=y.scale, xlabel=x.title)
@@ -192,6 +208,8 @@ def cell_maps(
         handles.append(Patch(color=NOT_GOOD, label=f"{word}, or no value" if left_out else word))
     if any(np.isnan(grid["share"]).any() for grid in grids):
         handles.append(mesh.hatched())
+    if both is not None and unpaired:
+        handles.append(mesh.hatched("no pairs", mesh.NO_PAIRS))
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
@@ -295,12 +313,17 @@ def _difference(
     of: str,
     *,
     writes: bool,
-) -> None:
-    """The second law minus the first, with dots where its interval excludes 0; of medians the numbers of pairs too."""
+) -> bool:
+    """The second law minus the first, with dots where its interval excludes 0; of medians the numbers of pairs too.
+
+    Returns whether some cells have no difference, which are hatched.
+    """
     difference, is_share = _grid(found, axes, "difference"), "pairs" not in found
     known = np.abs(difference[np.isfinite(difference)])
     size = 1.0 if is_share or not known.max(initial=0.0) else float(known.max())
     filled = mesh.fill(panel, *places, difference, cmap="RdBu", norm=Normalize(-size, size), vmin=None)
+    unknown = np.isnan(difference)
+    mesh.hatch(panel, *places, unknown, mesh.NO_PAIRS)
     figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85)
     marks = (found["low"] > 0.0) | (found["high"] < 0.0)
     for row, is_marked in zip(found.to_dict("records"), marks):  # the sign, which colours do not show in grey
@@ -319,14 +342,16 @@ def _difference(
     if len(marked):
         places_of_dots = [quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes)]
         panel.plot(*places_of_dots, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
+    return bool(unknown.any())
 
 
 def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool, repeats: bool) -> str:
-    number = ", and their number" if numbered else ""
     if metric == GOOD:
-        return f"share of {words[0]} runs{number}"
-    median = "median of " if repeats else ""
-    return f"{median}{labels.metric_with_unit(metric, units.get(metric))},\nwhere {words[0]}{number}"
+        return f"share of {words[0]} runs" + (", and their number" if numbered else "")
+    named = labels.metric_with_unit(metric, units.get(metric))
+    if not repeats:
+        return f"{named},\nwhere {words[0]}"
+    return f"median of {named},\n{'number of' if numbered else 'of the'} {words[0]} runs with a value"
 
 
 def _repetitions(cells: "pd.DataFrame", metric: str) -> str:

@@ -75,7 +75,8 @@ def lines(
         panel.axhline(
             edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(units.get(metric))}"
         )
-    _mark_diverged(panel, {color: at for color, at in diverged.items() if len(at)})
+    if places := {color: at for color, at in diverged.items() if len(at)}:
+        mark_edge(panel, places, "^")
     plain(panel.xaxis)
     plain(panel.yaxis)
     handles, names = panel.get_legend_handles_labels()
@@ -83,19 +84,19 @@ def lines(
     return figure
 
 
-def _mark_diverged(panel: Axes, places: Mapping[str | tuple[float, ...], Floats]) -> None:
-    """Triangles along the upper edge, in a row for each colour, above all other marks."""
-    if not places:
-        return
+def mark_edge(panel: Axes, places: Mapping[str | tuple[float, ...], Floats], mark: str, *, low: bool = False) -> None:
+    """Marks along the upper edge, or the lower, in a row for each colour, beyond all other marks."""
     step = min(0.022, 0.25 / len(places))
     share = step * (len(places) + 1)
     scale = panel.yaxis.get_transform()
-    low, high = (scale.transform(end) for end in panel.get_ylim())
-    top = scale.inverted().transform(high + (high - low) * share / (1.0 - share))
-    panel.set_ylim(top=float(np.asarray(top)))
+    bottom, top = (scale.transform(end) for end in panel.get_ylim())
+    more = (top - bottom) * share / (1.0 - share)
+    end = float(np.asarray(scale.inverted().transform(bottom - more if low else top + more)))
+    panel.set_ylim(end if low else None, None if low else end)
     for row, (color, at) in enumerate(places.items(), start=1):
+        height = row * step if low else 1.0 - row * step
         across = panel.get_xaxis_transform()
-        panel.plot(at, np.full(len(at), 1.0 - row * step), "^", color=color, markersize=4, transform=across)
+        panel.plot(at, np.full(len(at), height), mark, color=color, markersize=4, transform=across)
 
 
 def scatter(

@@ -19,7 +19,9 @@ LIMIT = {"colors": RED, "linewidths": 1.8}
 """Style of the line between good and other cells"""
 FEW = 6
 """Most values of an axis that all have a tick"""
-_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.0}
+MISSING, NO_PAIRS = "////", "xxx"
+"""Hatches of cells without a run, and without a pair of runs"""
+_HATCHED: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "linewidth": 0.0}
 
 
 def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Floats:
@@ -69,16 +71,16 @@ def fill_kinds(panel: Axes, x: Floats, y: Floats, kinds: Floats, colors: Sequenc
     fill(panel, x, y, kinds, cmap=ListedColormap([*colors]), vmin=-0.5, vmax=len(colors) - 0.5)
 
 
-def hatch(panel: Axes, x: Floats, y: Floats, where: npt.NDArray[np.bool_]) -> None:
+def hatch(panel: Axes, x: Floats, y: Floats, where: npt.NDArray[np.bool_], how: str = MISSING) -> None:
     """Hatch the cells without a value."""
     cells = [Rectangle((x[j], y[i]), x[j + 1] - x[j], y[i + 1] - y[i]) for i, j in zip(*np.nonzero(where), strict=True)]
     if cells:
-        panel.add_collection(PatchCollection(cells, label="missing", **_HATCH))
+        panel.add_collection(PatchCollection(cells, hatch=how, **_HATCHED))
 
 
-def hatched() -> Patch:
+def hatched(label: str = "missing", how: str = MISSING) -> Patch:
     """The legend entry of hatched cells."""
-    return Patch(label="missing", **_HATCH)
+    return Patch(label=label, hatch=how, **_HATCHED)
 
 
 def limit(panel: Axes, x: Floats, y: Floats, good: Floats, **how: Any) -> LineCollection | None:

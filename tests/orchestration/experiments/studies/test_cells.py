@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import quadcosim
@@ -103,6 +104,16 @@ def test_good_runs_without_the_metric_are_left_out_and_counted_as_such_in_map_li
     figure = cell_lines(table, LOSSES, one_law, "position_rmse", WORDS, units={})
     assert [text.get_text() for text in figure.axes[0].texts] == ["5"]
     assert "; 4 good runs without a value" in figure.get_suptitle()
+    assert crosses_of(figure) == [0.0, 0.1]
+    assert figure.get_suptitle().replace("\n", " ").endswith("with a value by CascadedController at 0, 0.1")
+
+
+def crosses_of(figure: Figure) -> list[float]:
+    """The places of the crosses, which are at the lower edge of its panel."""
+    drawn = [np.asarray(line.get_data()) for line in figure.axes[0].get_lines() if line.get_marker() == "x"]
+    ((at, height),) = [data for data in drawn if data.size]
+    assert max(height) < 0.05
+    return [*at]
 
 
 def test_runs_that_no_criterion_judges_have_no_share() -> None:
@@ -225,6 +236,14 @@ def test_a_map_of_two_laws_has_a_third_panel_with_their_difference() -> None:
     )
 
 
+def test_cells_without_a_pair_of_good_runs_are_hatched_in_the_difference_of_medians() -> None:
+    figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "position_rmse", WORDS, units={})
+    (hatched,) = [one for one in figure.axes[2].collections if one.get_hatch()]
+    assert len(hatched.get_paths()) == 4, "without loss, and at 20 ms"
+    assert figure.legends[0].get_texts()[-1].get_text() == "no pairs"
+    assert figure.axes[3].get_xlabel().endswith("\nnumber of settled runs with a value")
+
+
 def test_a_map_without_room_for_how_many_of_all_runs_are_good_has_the_good_ones_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -282,7 +301,12 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
 def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     figure = cell_lines(runs(), LOSSES, LAWS, "position_rmse", WORDS, units={}, style=STYLES["paper"])
     assert [text.get_text() for text in figure.axes[0].texts] == ["16", "16", "16", "3", "6"]
-    assert figure.axes[0].get_ylabel().endswith("where settled, and their number")
+    assert figure.axes[0].get_ylabel().endswith("\nnumber of settled runs with a value")
+    assert crosses_of(figure) == [0.0], "none of the second law is good there"
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [*(LAWS.values or ()), "no value"]
+    told = "; crosses: no settled run with a value by CascadedController at 0"
+    assert str(figure.get_label()).endswith(told)
     first = next(iter(figure.axes[0].collections)).get_segments()[0]  # type: ignore[attr-defined]
     low, high = medians_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[0, ["low", "high"]]
     assert first[:, 1].tolist() == [low, high], "the interval of the first place"
