@@ -3,10 +3,14 @@
 import json
 import re
 import shlex
+import shutil
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import quadcosim
 from orchestration.command.cli import main
 from tests.places import ROOT
 
@@ -36,6 +40,24 @@ def test_the_observer_of_the_page_of_controllers_follows_an_angle_that_moves_eve
         watching.step(0.01 * k, 0.01)
     assert watching.rate == pytest.approx(0.3, rel=1e-9)
     assert watching.near == pytest.approx(watching.angle, rel=1e-9)
+
+
+def test_the_lqg_of_the_page_of_python_has_the_poles_and_the_limit_that_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("control")
+    shutil.copytree(ROOT / "examples/dc_servo", tmp_path / "examples/dc_servo")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs/python.md").read_text(encoding="utf-8").split("### LQG with a delay")[1].split("\n## ")[0]
+    made: dict[str, Any] = {"np": np, "quadcosim": quadcosim}
+    for file, text in re.findall(r"```python ?(\S*)\n(.*?)```", page, re.S):
+        if file:
+            Path(file).write_text(text, encoding="utf-8")
+        else:
+            exec(text, made)
+    agree, limit = capsys.readouterr().out.split()
+    assert (agree, len(made["designed"])) == ("True", 4)
+    assert float(limit) == pytest.approx(0.028, abs=1e-5)
 
 
 def test_no_text_says_that_the_proof_needs_one_coupling() -> None:
