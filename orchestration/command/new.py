@@ -22,6 +22,10 @@ def new(
     author: Annotated[str | None, option("--author", "Author; default: git's user.name.")] = None,
     license: Annotated[str, option("--license", "Licence of the slave.", "TEXT")] = "",
     in_c: Annotated[bool, option("--c", "A controller in C, and the file by which it is wrapped.")] = False,
+    plant: Annotated[
+        str | None,
+        option("--for", "A controller for this plant: its outputs in, its inputs out, connected.", "PLANT.fmu"),
+    ] = None,
     out: Annotated[Path, option("--out", "Folder in which it is written; default: this one.", "DIR")] = Path(),
 ) -> CommandResult:
     """Write a folder NAME: a law for the quadrotor (controller), or for a plant of your own, or a filter; its test.
@@ -36,13 +40,24 @@ def new(
     if in_c and kind != "controller":
         raise UsageError(f"new {kind} --c: expected controller; a plant with its law in C is in examples/dc_motor")
     author = git_author() if author is None else author
-    written = write(kinds[kind], name, out, author=author, license=license, in_c=in_c)
+    of_plant = None if plant is None else _of_plant(plant, kind, in_c, out / name)
+    written = write(kinds[kind], name, out, author=author, license=license, in_c=in_c, of_plant=of_plant)
     if not author:
         inform(
             f"no author is set: set it by --author NAME, or in the line author = of the {'file' if in_c else 'class'}"
         )
     inform(f"next: quadcosim run {out / name / 'system.toml'}")
     return result_of_files(written)
+
+
+def _of_plant(plant: str, kind: str, in_c: bool, folder: Path) -> dict[str, str]:
+    from orchestration.components.building import fmus
+    from orchestration.components.fmi.read_description import read_model
+    from orchestration.systems.system.for_plant import texts_for
+
+    if kind != "controller" or in_c:
+        raise UsageError(f"new {kind} --for {plant}: expected new controller, without --c")
+    return texts_for(plant, read_model(fmus.locate(plant, inform)), folder)
 
 
 def examples(

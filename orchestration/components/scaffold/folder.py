@@ -5,6 +5,7 @@ import keyword
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from string import Template
 from typing import Literal
@@ -24,6 +25,11 @@ _IN_PYTHON = {
     "system.toml": "{kind}_system.toml",
     "README.md": "{kind}_README.md",
 }
+_FOR_A_PLANT = {
+    "{module}.py": "for_plant_law.py",
+    "system.toml": "for_plant_system.toml",
+    "README.md": "for_plant_README.md",
+}
 _IN_C = {
     "{module}.c": "c_{kind}_law.c",
     "{module}.h": "c_{kind}_law.h",
@@ -35,8 +41,19 @@ _IN_C = {
 """Templates by the file that is written"""
 
 
-def write(kind: Kind, name: str, where: Path, *, author: str, license: str, in_c: bool = False) -> list[Path]:
-    """Write the folder `where`/`name`; the paths of its files. A controller may be `in_c`.
+def write(
+    kind: Kind,
+    name: str,
+    where: Path,
+    *,
+    author: str,
+    license: str,
+    in_c: bool = False,
+    of_plant: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """Write the folder `where`/`name`; the paths of its files.
+
+    A controller may be `in_c`, or for a plant, of which the templates need texts: `of_plant`.
 
     The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for an invalid name, or if the
     folder exists.
@@ -48,7 +65,8 @@ def write(kind: Kind, name: str, where: Path, *, author: str, license: str, in_c
     expect_new(folder)
     names = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
     names |= {"guard": module.upper(), "fmu": f"{module}{WRAPPED}" if in_c else f"{model}.fmu"}
-    templates = _IN_C if in_c else _IN_PYTHON
+    names |= of_plant or {}
+    templates = _IN_C if in_c else _IN_PYTHON if of_plant is None else _FOR_A_PLANT
     files = {key.format(module=module): value.format(kind=kind) for key, value in templates.items()}
     with new_files(where) as new:
         for file, template in files.items():

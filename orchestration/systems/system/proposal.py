@@ -30,6 +30,13 @@ _TO_FILL_IN = (
     '# good = "final < 0.05"',
     '# diverged = "abs({0}) > 1e3"',
 )
+
+
+def to_fill_in(signal: str) -> list[str]:
+    """Comments on objectives and a criterion, about a signal."""
+    return [line.format(signal) for line in _TO_FILL_IN]
+
+
 TAKEN = frozenset(("rows", "time", "stop_time", "sampled"))
 """Names that no component can have"""
 
@@ -91,7 +98,7 @@ def propose(fmus: Sequence[tuple[str, Model]], folder: Path, resources: Proposed
     moving = sorted(named, key=lambda name: name in sampled)
     first = next((f"{n}.{v}" for n in moving for v in named[n].names("output", kinds=("Real",))), None)
     if first is not None:
-        blocks.append([line.format(first) for line in _TO_FILL_IN])
+        blocks.append(to_fill_in(first))
     return Proposal(
         text="\n\n".join("\n".join(block) for block in blocks) + "\n",
         guessed=(
@@ -176,8 +183,7 @@ def _has_feedthrough(model: Model) -> bool:
 
 def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | None) -> list[str]:
     """The lines of a component; `sampled` is the reason for sampling it."""
-    place = _relative(Path(fmu), folder) if fmu.endswith(PATHS) else fmu
-    lines = [f"[components.{name}]", f"fmu = {_text(place)}"]
+    lines = [f"[components.{name}]", f"fmu = {placed(fmu, folder)}"]
     step = experiment(model, "stepSize")
     if model.ticking:
         clock, scheduled = model.ticking[0], model.interface == SCHEDULED
@@ -192,6 +198,11 @@ def _component(name: str, fmu: str, model: Model, folder: Path, sampled: str | N
         note = "" if step else "    # its FMU does not say how long"
         lines.append(f"step = {step or STEP!r}{note}")
     return lines
+
+
+def placed(fmu: str, folder: Path) -> str:
+    """The value of the key `fmu` in a file that lies in `folder`, of the path or name that the user wrote."""
+    return _text(_relative(Path(fmu), folder) if fmu.endswith(PATHS) else fmu)
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -227,8 +238,8 @@ def _connections(found: Sequence[Match]) -> list[list[str]]:
 
 def _connection(name: str, members: Sequence[Match], converted: str) -> list[str]:
     lines = ["[[connections]]", f"name = {_text(name)}"]
-    lines += _list("from", [m.start for m in members])
-    lines += _list("to", [m.end for m in members])
+    lines += listed("from", [m.start for m in members])
+    lines += listed("to", [m.end for m in members])
     if converted:
         conversion = members[0].conversion
         lines.append(f"scale = {conversion.scale!r}    # its units differ")
@@ -240,7 +251,8 @@ def _guesses(matches: Iterable[Match]) -> tuple[str, ...]:
     return tuple(f"{m.end} has {m.start} because {m.why}" for m in matches if m.why is not None)
 
 
-def _list(key: str, ends: Sequence[str]) -> list[str]:
+def listed(key: str, ends: Sequence[str]) -> list[str]:
+    """The lines of a key whose value is a list of texts."""
     line = f"{key} = [{', '.join(map(_text, ends))}]"
     return [line] if len(line) <= WIDTH else [f"{key} = [", *(f"    {_text(end)}," for end in ends), "]"]
 
