@@ -314,12 +314,12 @@ def _cells(name: str) -> list[CellSummary]:
 
 
 def _by_size(name: str, factor: float = 1.0) -> Iterator[tuple[str, plots.BySize]]:
-    """By controller and condition: values of the axis, times a factor, and the shares that survive."""
+    """By controller and condition: values of the axis, times a factor, and how many survive, of how many."""
     several = len(load(name).conditions) > 1
     for key, group in groupby(read_data(name)["cells"], lambda cell: (cell["controller"], cell["condition"])):
         cells, controller = [*group], ", ".join(key[: 1 + several])
-        share = np.array([[alive / count for alive, count in cell["by_size"]["survive"]] for cell in cells])
-        yield controller, ([factor * cell["value"] for cell in cells], share.T)
+        counts = np.array([cell["by_size"]["survive"] for cell in cells])
+        yield controller, ([factor * cell["value"] for cell in cells], counts.swapaxes(0, 1))
 
 
 def _reaches(name: str, factor: float = 1.0) -> Iterator[Reach]:

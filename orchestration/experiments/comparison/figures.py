@@ -11,13 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from orchestration.experiments.comparison.cells import CellSummary, Median
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.studies.axes import Value
-from orchestration.foundation.basics.simulator import Floats
+from orchestration.experiments.studies.cell_figures import HALF, OF_ALL, letters_of, write_counts
+from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.figures import cells
 from orchestration.simulation.figures.lines import abreast, plain
 from orchestration.simulation.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
@@ -26,31 +28,62 @@ from orchestration.simulation.results.quantities import Quantity
 
 BINS = 8
 """Number of intervals of the size of the initial error"""
+BESIDE_BAR = 0.85
+"""Share of the width that panels have beside a colour bar"""
 
-BySize: TypeAlias = tuple[Sequence[Any], Floats]
-"""Values of an axis, and the share of the initial conditions, shape (`BINS` of the size of the error, values)"""
+BySize: TypeAlias = tuple[Sequence[Any], Integers]
+"""Values of an axis, and how many initial conditions have a fate, of how many, shape (`BINS` of the size of the error,
+values, 2)"""
 
 
 def basins(by_size: Mapping[str, BySize], axis: Quantity, fate: str, title: str, style: Style = SCREEN) -> Figure:
     """The share that survives, or settles, over size of the initial error and axis, a panel for each controller.
 
-    The white line is where half of them do. Panels have one axis if all controllers have the same values.
+    Cells have these numbers where there is room. The line is where half of them do. Panels have one axis if all
+    controllers have the same values.
     """
     is_one = len({tuple(values) for values, _ in by_size.values()}) == 1
     figure, panels = _panels(len(by_size), 22.0, style, sharex=is_one)
-    bins = np.linspace(0.0, 1.0, BINS + 1)
-    for panel, (name, (values, share)) in zip(panels, by_size.items()):
-        x = cells.edges(axis.of(values))
-        mesh = cells.fill(panel, x, bins, share, vmin=0.0, vmax=1.0)
-        cells.hatch(panel, x, bins, np.isnan(share))
-        cells.limit(panel, x, bins, np.where(np.isnan(share), np.nan, share >= 0.5), colors="white")
-        cells.name_cells(panel, axis.of(values))
+    columns = panels[0].get_gridspec().ncols
+    starts = np.concatenate([counts[..., 1].ravel() for _, counts in by_size.values()])
+    drawn = [
+        _basin(panel, axis.of(values), counts, BESIDE_BAR * letters_of(style, columns))
+        for panel, (values, counts) in zip(panels, by_size.values())
+    ]
+    for panel, name in zip(panels, by_size):
         panel.set_title(name)
-    figure.colorbar(mesh, ax=panels.tolist(), label=f"share that {fate}s")
-    figure.supxlabel(axis.title)
+    for panel in panels[-columns:]:
+        panel.set_xlabel(axis.title)
+    figure.colorbar(drawn[0][0], ax=panels.tolist(), label=f"share that {fate}s")
     figure.supylabel("size of the initial error")
-    style.set_title(figure, _joined(title, f"above the white line less than half of the starts {fate}"))
+    fewest, most = starts.min(), starts.max()
+    style.set_title(
+        figure, _joined(title, f"{fewest} to {most} starts a cell" if fewest < most else f"{most} starts a cell")
+    )
+    limit = Line2D([], [], color=cells.LIMIT["colors"], label=f"half of the starts {fate}")
+    handles: list[Line2D | Patch] = [limit] if any(has_limit for _, has_limit in drawn) else []
+    handles += [cells.hatched("no starts")] if not fewest else []
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
+
+
+def _basin(panel: Axes, at: Floats, counts: Integers, letters: float) -> tuple[Any, bool]:
+    """Cells at places of the axis, with room for so many letters abreast; the mesh, and whether there is a line."""
+    x, sizes = cells.edges(at), np.linspace(0.0, 1.0, BINS + 1)
+    has, of = counts[..., 0], counts[..., 1]
+    known = of > 0
+    share = np.where(known, has / np.maximum(of, 1), np.nan)
+    mesh = cells.fill(panel, x, sizes, share, vmin=0.0, vmax=1.0)
+    cells.hatch(panel, x, sizes, ~known)
+    limit = cells.limit(panel, x, sizes, np.where(known, share >= HALF, np.nan))
+    cells.name_cells(panel, at)
+    longest = len(OF_ALL.format(of.max(), of.max())) + 1
+    if longest <= letters * np.diff(x).min() / (x[-1] - x[0]):
+        rows, columns = np.nonzero(known)
+        middles = 0.5 * (sizes[:-1] + sizes[1:])
+        write_counts(panel, at[columns], middles[rows], has[known], of[known], OF_ALL)
+    return mesh, limit is not None
 
 
 def shares(

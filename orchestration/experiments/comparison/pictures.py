@@ -21,7 +21,7 @@ from orchestration.experiments.studies.cell_figures import cell_maps
 from orchestration.experiments.studies.figures import made, save
 from orchestration.experiments.studies.shares import GOOD
 from orchestration.experiments.studies.table import note_in
-from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.simulator import Integers
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
 
@@ -134,12 +134,15 @@ def reaches_of(comparison: Comparison, limits: Sequence[GridLimit]) -> list[Reac
     ]
 
 
-def _by_size(comparison: Comparison, rows: "pd.DataFrame", fate: str) -> Floats:
-    """The share that survives, or settles, by bin of the size of the initial error and value of the axis."""
+def _by_size(comparison: Comparison, rows: "pd.DataFrame", fate: str) -> Integers:
+    """How many survive, or settle, of how many, by bin of the size of the initial error and value of the axis."""
     bins = (BINS * sizes(comparison, rows).to_numpy(float)).astype(int).clip(max=BINS - 1)
-    counted = rows.assign(bin=bins, has=FATES[fate](rows).astype(float))
-    shares_known = counted.pivot_table(index="bin", columns=comparison.axis.name, values="has")
-    return np.asarray(shares_known.reindex(index=range(BINS), columns=[*comparison.values]).to_numpy(float))
+    places = rows[comparison.axis.name].map({value: k for k, value in enumerate(comparison.values)})
+    counts = np.zeros((BINS, len(comparison.values), 2), int)
+    np.add.at(
+        counts, (bins, places.to_numpy(int)), np.column_stack([FATES[fate](rows), np.ones(len(rows))]).astype(int)
+    )
+    return counts
 
 
 def _is_known(point: Point) -> bool:

@@ -1,7 +1,7 @@
 """Figures of cells: shares of good runs with their intervals, medians, and the difference between two laws."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,8 +39,8 @@ HALF = 0.5
 """Share at which a map has its line"""
 MAX_LETTERS = 120
 """Most letters of a row of cells, over all panels, with a space after each: more do not fit into a figure"""
-MAX_TICKS = 108, 12
-"""Most letters of the ticks below a row of panels, and most ticks beside a panel"""
+MAX_TICKS = 12
+"""Most ticks beside a panel"""
 MAX_PANELS = 9
 """Most values of a third axis of numbers: a map for each, three in a row"""
 _NO_VALUE = "no value"
@@ -148,8 +148,8 @@ def cell_maps(
         panel.set_visible(False)
     grids = [{name: _grid(group, axes, name) for name in ("value", "share")} for _, group in groups]
     everything = np.stack([grid["value"] for grid in grids])
-    letters = min(1.0, style.width / style.font * SCREEN.font / SCREEN.width) / columns
-    room, most = MAX_LETTERS * letters / (len(places[0]) - 1), found["count"].max()
+    letters = letters_of(style, columns)
+    room, most = letters / (len(places[0]) - 1), found["count"].max()
     has_room = {form: len(form.format(most, most)) + 1 <= room for form in (OF_ALL, ALONE, MARKED)}
     writes, repeats = has_room[ALONE], most > 1
     for panel, (law, group), grid in zip(panels, groups, grids):
@@ -157,7 +157,8 @@ def cell_maps(
         mesh.hatch(panel, *places, np.isnan(grid["share"]))
         _limit(panel, places, grid["share"])
         if metric == GOOD and writes:
-            _write_counts(panel, (x, y), axes, group, OF_ALL if has_room[OF_ALL] else ALONE)
+            at, up = (quantity.of(group[axis.name]) for quantity, axis in zip((x, y), axes))
+            write_counts(panel, at, up, group["good"], group["count"], OF_ALL if has_room[OF_ALL] else ALONE)
         elif writes and repeats:
             _write_numbers(panel, (x, y), axes, group[group[WITH_VALUE] > 0].set_index(_names(*axes))[WITH_VALUE], 0.0)
         panel.set_title(law or "")
@@ -187,9 +188,9 @@ def cell_maps(
         panel.xaxis.set_tick_params(labelbottom=True)
         mesh.name_cells(panel, *(each.shown if each.is_even else None for each in (x, y)))
         if not x.is_even:
-            panel.set_xticks(*x.ticks(MAX_TICKS[0] * letters / (x.longest + 1)))
+            panel.set_xticks(*x.ticks(0.9 * letters / (x.longest + 1)))
         if not y.is_even:
-            panel.set_yticks(*y.ticks(MAX_TICKS[1]))
+            panel.set_yticks(*y.ticks(MAX_TICKS))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
     excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
@@ -282,13 +283,18 @@ def _has_limit(share: Floats) -> bool:
     return bool((known >= HALF).any() and (known < HALF).any())
 
 
-def _write_counts(
-    panel: Axes, quantities: tuple["_Cells", "_Cells"], axes: tuple[Axis, Axis], group: "pd.DataFrame", form: str
+def letters_of(style: Style, columns: int) -> float:
+    """The letters of numbers in cells that fit side by side into one of several panels abreast."""
+    return MAX_LETTERS * min(1.0, style.width / style.font * SCREEN.font / SCREEN.width) / columns
+
+
+def write_counts(
+    panel: Axes, x: Iterable[float], y: Iterable[float], good: Iterable[int], count: Iterable[int], form: str
 ) -> None:
-    x, y = (quantity.of(group[axis.name]) for quantity, axis in zip(quantities, axes))
-    for across, up, good, count, share in zip(x, y, *(group[name] for name in ("good", "count", "share"))):
-        color = "white" if share < HALF else BLACK
-        panel.text(across, up, form.format(good, count), color=color, ha="center", va="center", fontsize="x-small")
+    """Write into the cells at `x` and `y` how many runs are good, in one of the forms of such texts."""
+    for across, up, some, all_ in zip(x, y, good, count):
+        color = "white" if some < HALF * all_ else BLACK
+        panel.text(across, up, form.format(some, all_), color=color, ha="center", va="center", fontsize="x-small")
 
 
 def _write_numbers(

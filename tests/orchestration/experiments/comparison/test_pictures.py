@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import CellSummary, Median, Share
-from orchestration.experiments.comparison.figures import Reach, colors_of, fronts_of, limits_of, shares
+from orchestration.experiments.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.simulation.figures.names import COLUMNS
@@ -49,6 +50,24 @@ def test_several_panels_have_their_controllers_in_one_legend() -> None:
     figure = drawn("one", "other")
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [*SURVIVORS, "survive", "settle"]
     assert not any(panel.texts for panel in figure.axes)
+
+
+def test_cells_of_a_basin_have_their_numbers_of_starts_and_its_line_is_told() -> None:
+    counts = np.array([[[2, 2], [2 * (size < 4), 2]] for size in range(BINS)])
+    counts[0] = 0
+    figure = basins({"one": ([0.01, 0.02], counts)}, Quantity(name="period", unit="ms", factor=1e3), "settle", "")
+    panel = figure.axes[0]
+    texts = {text.get_position(): text.get_text() for text in panel.texts}
+    assert len(texts) == 2 * (BINS - 1)
+    assert (texts[10.0, 0.9375], texts[20.0, 0.9375], texts[20.0, 0.1875]) == ("2/2", "0/2", "2/2")
+    (line,) = [one for one in panel.collections if isinstance(one, LineCollection)]
+    assert np.concatenate(line.get_segments())[:, 1].min() == 0.5
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["half of the starts settle", "no starts"]
+    assert figure.get_suptitle() == "0 to 2 starts a cell"
+    values = [*np.arange(1.0, 41.0)]
+    many = basins({"one": (values, np.ones((BINS, 40, 2), int))}, Quantity(name="period"), "settle", "")
+    assert not many.axes[0].texts, "there is no room"
+    assert not many.legends
 
 
 @pytest.mark.parametrize("style", [SCREEN, replace(STYLES["paper"], width=COLUMNS["single"])], ids=["screen", "single"])
