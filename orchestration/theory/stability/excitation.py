@@ -152,13 +152,13 @@ class Excitation:
     def outputs_after(self, start: SavedState, rungs: Sequence[Rung]) -> Floats:
         """The outputs at the end of each rung, shape (rungs, outputs), the inputs at rest."""
         if len(set(rungs)) > 1:
-            return self._course(start, [(self.held, rung) for rung in rungs])
+            return self.course(start, [(self.held, rung) for rung in rungs])
         found: Floats = np.zeros((len(rungs), len(self.outputs)))
         for k, rung in enumerate(rungs):  # samples, most of which an earlier state has come by
             found[k], start = self.followed(start, rung)
         return found
 
-    def _course(self, start: SavedState, legs: Sequence[tuple[Floats, Rung]], largest: float = np.inf) -> Floats:
+    def course(self, start: SavedState, legs: Sequence[tuple[Floats, Rung]], largest: float = np.inf) -> Floats:
         """The outputs at the end of each rung, with its inputs; ends with a deviation from rest above `largest`."""
         self._fmu.restore(start.saved)
         self._time, inputs = start.time, None
@@ -178,7 +178,7 @@ class Excitation:
 
     def stepped(self, start: SavedState, rung: Rung, held: Floats) -> tuple[Floats, SavedState]:
         """The outputs and the state after a rung; the inputs are `held`."""
-        outputs = self._course(start, [(held, rung)])[0]
+        outputs = self.course(start, [(held, rung)])[0]
         return outputs, SavedState(self._fmu.save(), self._time)
 
     def followed(self, start: SavedState, rung: Rung) -> tuple[Floats, SavedState]:
@@ -207,7 +207,7 @@ class Excitation:
             pulsed = self.pulsed(i, factor * move)
             later = pulsed if lasting else self.held
             legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
-            courses.append(self._course(self.rest, legs, self.largest))
+            courses.append(self.course(self.rest, legs, self.largest))
         return self._response(courses, factor)
 
     def followed_response(self, i: int, rungs: Sequence[Rung], factor: float = 1.0) -> Floats:
@@ -233,7 +233,7 @@ class Excitation:
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
-        up, down = (self._course(self.rest, [(self.held + move * x, rung) for x in moves]) for move in MOVES)
+        up, down = (self.course(self.rest, [(self.held + move * x, rung) for x in moves]) for move in MOVES)
         return np.asarray(0.5 * (up - down))
 
     # -- coarse rounding -------------------------------------------------------------------------------------------

@@ -122,6 +122,24 @@ class Tangent(LinearSimulator):
         error = np.abs(seen - np.concatenate([self._back @ found, after])).max(initial=0.0)
         return found, float(error), float(np.abs(seen).max(initial=0.0))
 
+    @property
+    def rest(self) -> SavedState:
+        """The state about which it is the tangent."""
+        return self._excitation.rest
+
+    def drift(self, state: SavedState, held: Floats) -> tuple[Floats, Floats]:
+        """The outputs after a first rung from a state, and by how much the coordinates change, with inputs `held`."""
+        excitation, rung = self._excitation, self._rung(self.ladder[0].duration)
+        outputs, later = excitation.stepped(state, rung, held)
+        here, there = (excitation.course(one, [(held, each) for each in self.ladder]) for one in (state, later))
+        return outputs, self._axes.T @ ((there - here) / excitation.weight).ravel()
+
+    def led(self, state: SavedState, inputs: Floats) -> SavedState:
+        """The state after first rungs from a state, with inputs for each, shape (n, inputs)."""
+        for held in inputs:
+            _, state = self._excitation.stepped(state, self._rung(self.ladder[0].duration), held)
+        return state
+
     def about(self, rest: Rest) -> "Tangent | None":
         """This tangent, if it holds to `LINEAR` where the same instance with the same inputs rests now; else None."""
         excitation = Excitation(rest)

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,7 +15,7 @@ from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.instance import Instance, Loader
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.terminal import stated_beside_bar
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
@@ -27,6 +27,7 @@ from orchestration.systems.system.component import Component, Parameter, Samplin
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
+from orchestration.theory.stability.equilibrium import Steady, balance
 from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.fixed_periods import in_fixed_periods
 from orchestration.theory.stability.identification import FINEST, SampledRest, in_continuous_time, of_samples
@@ -76,6 +77,8 @@ class Start:
     components: Mapping[str, Component]
     saved: Mapping[str, tuple[bytes, float]]
     """Saved states of the components, and the times of their next steps by their own clocks [s]"""
+    held: Mapping[str, Mapping[str, float]]
+    """The inputs of the components there"""
     ticking: frozenset[str]
     """Components with clocks of FMI 3.0"""
     tunable: frozenset[str]
@@ -90,6 +93,7 @@ class Start:
         return cls(
             components=simulation.system.components,
             saved={name: (state, instances[name].time) for name, state in saved.items()},
+            held=written_in(simulation),
             ticking=frozenset(name for name, one in instances.items() if one.model.ticking),
             tunable=frozenset(
                 f"{name}.{variable.name}"
@@ -104,7 +108,8 @@ class Start:
         if system.components.keys() != self.components.keys():
             return None
         both = [(name, one.parameters, system.components[name].parameters) for name, one in self.components.items()]
-        tuned = {name: {key: new[key] for key in new if old.get(key) != new[key]} for name, old, new in both}
+        differing = {name: {key: new[key] for key in new if old.get(key) != new[key]} for name, old, new in both}
+        tuned = {name: each for name, each in differing.items() if each}
         components = {name: replace(self.components[name], parameters=new) for name, _, new in both}
         found = replace(self, components=components, tuned=tuned)
         is_tunable = self.tunable.issuperset(f"{name}.{key}" for name, each in tuned.items() for key in each)
@@ -273,26 +278,61 @@ def _settled(
 ) -> Iterator[AtRest]:
     """A system that has come to rest over some periods: from where one has that differs in timing, or by a run.
 
-    Where that run finds no rest, as of an unstable loop: from where one has that differs in parameters, if it stays.
+    Where that run finds no rest, as of an unstable loop: at the rest that is computed from one near by.
     """
-    kept = known.start if time_to_rest(calm) else None
-    starts: list[Start | None] = [kept] if kept is not None and kept.serves(calm) else []
-    tuned = None if kept is None or starts else kept.tuned_to(calm)
+    near = known.start.tuned_to(calm) if known.start is not None and time_to_rest(calm) else None
     with ExitStack() as stack:
-        why: NotAnEquilibriumError | None = None
-        for start in (*starts, None, *([] if tuned is None else [tuned])):
-            try:
-                simulation = stack.enter_context(_rested(calm, period, instances, models, start))
-                break
-            except NotAnEquilibriumError as error:
-                why = error if start is None else why
-        else:
-            assert why is not None
-            raise why
+        simulation, start = _found(
+            stack,
+            partial(_rested, calm, period, instances, models),
+            near,
+            partial(_corrected, calm, period, instances, known),
+        )
         saved = {name: one.save() for name, one in simulation.instances.items()}
-        if time_to_rest(calm) and start is None:
-            known.start = Start.of(simulation, saved)
+        if time_to_rest(calm):
+            known.start = Start.of(simulation, saved) if start is None else start
         yield AtRest(simulation=simulation, saved_states=saved, extra=extra, period=period, known=known)
+
+
+def _found(
+    stack: ExitStack,
+    rested: Callable[[Start | None], AbstractContextManager[PreparedRun]],
+    near: Start | None,
+    corrected: Callable[[Start], Start],
+) -> tuple[PreparedRun, Start | None]:
+    """A run at rest, and where it has begun: near by, if that differs in timing only, None: by itself, or corrected."""
+    if near is not None and not near.tuned:
+        with suppress(NotAnEquilibriumError):
+            return stack.enter_context(rested(near)), near
+    try:
+        return stack.enter_context(rested(None)), None
+    except NotAnEquilibriumError:
+        if near is not None:
+            with suppress(UsageError, SimulatorError):
+                start = corrected(near)
+                return stack.enter_context(rested(start)), start
+        raise
+
+
+def _corrected(calm: System, period: Fraction, instances: Instances, known: KnownTangents, near: Start) -> Start:
+    """Where a system rests, from where one does near by; raises `UsageError` where a component has no tangent there."""
+    with prepared(calm, load=tracing_loader(instances, near)) as simulation:
+        simulation.master.initialise()
+        ones = cast("Mapping[str, TracedInstance]", simulation.instances)
+        for name, one in ones.items():
+            one.begin(near.held[name])
+            if (sampling := calm.components[name].sampling) is not None:  # its outputs are those before
+                one.step(one.time - one.later, sampling.period)
+        saved = {name: one.save() for name, one in ones.items()}
+        loop = AtRest(simulation=simulation, saved_states=saved, extra=NO_SIGNALS, period=period, known=known)
+        components = [Steady(name, found, near.held[name]) for name, found in loop.tangents.items()]
+        balance(components, calm.connections)
+    return replace(
+        near,
+        saved={one.name: (one.state.saved, one.state.time) for one in components},
+        held={one.name: {**near.held[one.name], **dict(zip(one.inputs, one.held.tolist()))} for one in components},
+        tuned={},
+    )
 
 
 def keep_start(system: System, instances: Instances, known: KnownTangents) -> None:
@@ -346,7 +386,7 @@ def begin_of(calm: System, period: Fraction) -> Fraction:
 
 def written_in(simulation: PreparedRun) -> dict[str, dict[str, float]]:
     """The inputs last written in a run of instances that trace them, by component."""
-    return {name: cast("TracedInstance", one).written for name, one in simulation.instances.items()}
+    return {name: dict(cast("TracedInstance", one).written) for name, one in simulation.instances.items()}
 
 
 def samples_of(found: AnyTangent | SampledRest) -> int:
@@ -460,7 +500,7 @@ class TracedInstance:
     ) -> None:
         self.fmu, self._tuned = fmu, tuned or {}
         self.written: dict[str, float] = {}
-        self.time = self._later = 0.0
+        self.time = self.later = 0.0
         self._begins = begins
 
     def __getattr__(self, name: str) -> Any:
@@ -486,12 +526,18 @@ class TracedInstance:
         """As `Simulator`, without an end: other runs begin where this one has come to rest."""
         self.fmu.enter_initialization(start, math.inf)
         if self._begins is not None:
-            saved, time = self._begins
             self.fmu.exit_initialization()
+            self.later = self._begins[1] - start
+            self.begin({})
+
+    def begin(self, held: Mapping[str, float]) -> None:
+        """Take the state in which it begins, with some inputs."""
+        if self._begins is not None:
+            saved, self.time = self._begins
             self.fmu.restore(saved)
             for name, value in self._tuned.items():
                 self.fmu.set(name, value)
-            self._later = time - start
+            self.writer(list(held), np.array(list(held.values())))()
 
     def exit_initialization(self) -> None:
         """As `Simulator`."""
@@ -500,7 +546,7 @@ class TracedInstance:
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
-        t += self._later
+        t += self.later
         self.fmu.step(t, h)
         self.time = t + h
 
