@@ -18,16 +18,24 @@ def slaves_in(folder: Path) -> list[Target]:
     A folder with `__init__.py` is a package, imported from the folder of its outermost package; otherwise each
     module is imported by itself.
     """
+    return [target for target, left_open in _derived_in(folder) if not left_open]
+
+
+def unfinished_in(folder: Path) -> dict[str, list[str]]:
+    """The abstract classes of a folder that are derived from `Slave`, each with the methods that it leaves open."""
+    return {target.model: left_open for target, left_open in _derived_in(folder) if left_open}
+
+
+def _derived_in(folder: Path) -> Iterator[tuple[Target, list[str]]]:
     root, package = _root_of(folder.resolve())
-    found = []
     for path in sorted(folder.resolve().glob("*.py")):
         name = ".".join((*package, path.stem)) if path.stem != "__init__" else ".".join(package)
         if not name:
             continue
         for known in _definitions(path.read_text(encoding="utf-8"), path):
-            if isinstance(known, _Class) and _is_concrete(name, known.name, root):
-                found.append(Target(name, known.name, root))
-    return found
+            left_open = _left_open(name, known.name, root) if isinstance(known, _Class) else None
+            if left_open is not None:
+                yield Target(name, known.name, root), left_open
 
 
 def slave_beside(fmu: Path) -> Target | None:
@@ -84,12 +92,12 @@ class _Ancestor(NamedTuple):
     definition: _Class
 
 
-def _is_concrete(module: str, name: str, root: Path) -> bool:
-    """Whether a class is derived from `Slave` and has no abstract method."""
+def _left_open(module: str, name: str, root: Path) -> list[str] | None:
+    """The abstract methods of a class that is derived from `Slave`; None for any other."""
     first: dict[str, bool] = {}
     for each in _ancestry(module, name, root):
         first = dict(each.definition.methods) | first
-    return first.get("step") is False and not any(first.values())
+    return [method for method, is_abstract in first.items() if is_abstract] if "step" in first else None
 
 
 def _ancestry(module: str, name: str, root: Path | None, deepest: int = 20) -> list[_Ancestor]:

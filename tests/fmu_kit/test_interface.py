@@ -299,6 +299,11 @@ def test_names_that_every_slave_has_are_refused(name):
         type("Taken", (Slave,), {name: _named(name)})
 
 
+def test_a_name_of_another_variable_of_a_base_is_refused():
+    with pytest.raises(TypeError, match=r"Taken.gain: Law has a variable of this name, with causality parameter; exp"):
+        type("Taken", (Law,), {"gain": Output("gain", "1")})
+
+
 def test_a_unit_that_is_none_is_refused_where_it_is_written():
     with pytest.raises(ValueError, match="unit m/sq: expected powers of"):
         Input("speed", "m/sq")

@@ -18,7 +18,7 @@ from fmu_kit import packaging
 from fmu_kit.archive import read_source_hash
 from fmu_kit.bundle import SHARED_PACKAGES, PackagingError, Target, module_path
 from fmu_kit.compiler.pack import freshness
-from fmu_kit.discovery import slave_beside, slaves_in
+from fmu_kit.discovery import slave_beside, slaves_in, unfinished_in
 from fmu_kit.new_files import write_atomically
 from fmu_kit.variants import Variant
 from orchestration.components.building import consent
@@ -138,8 +138,15 @@ def slaves_of(folder: Path) -> list[Target]:
     if not slaves:
         if described := [path for path in sorted(folder.glob(f"*{WRAPPED}")) if _describes_c(path)]:
             raise UsageError(f"{folder}: this is C already, of which an FMU is made by quadcosim wrap {described[0]}")
+        for name in unfinished_in(folder):
+            _expect_finished(folder, name)
         raise UsageError(f"{folder}: expected a module with a subclass of fmu_kit.slave.Slave that has a description")
     return slaves
+
+
+def _expect_finished(folder: Path, name: str) -> None:
+    if left_open := unfinished_in(folder).get(name):
+        raise UsageError(f"{name} has no {' and no '.join(left_open)}: expected a slave in {folder} to define it")
 
 
 def _describes_c(path: Path) -> bool:
@@ -167,6 +174,7 @@ def slaves_named(text: str) -> list[Target]:
     slaves = slaves_of(path.parent)
     named = [target for target in slaves if target.model == path.name]
     if not named:
+        _expect_finished(path.parent, path.name)
         raise UsageError(f"{text}: expected one of {', '.join(target.model for target in slaves)} in {path.parent}")
     return named
 

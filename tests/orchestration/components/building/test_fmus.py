@@ -352,3 +352,10 @@ def test_every_slave_of_a_folder_is_built_into_it_unless_told(lamp: Path, tmp_pa
 def test_a_folder_without_slaves_is_wrong_usage(folder: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r": expected a "):
         builder.slaves_of(tmp_path / folder)
+
+
+def test_a_slave_that_leaves_a_method_open_is_told_which(tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_text("from fmu_kit.slave import Slave\nclass Law(Slave): ...\n", encoding="utf-8")
+    for text in (tmp_path, tmp_path / "Law"):
+        with pytest.raises(UsageError, match=r"^Law has no step: expected a slave in .* to define it$"):
+            builder.slaves_named(str(text))
