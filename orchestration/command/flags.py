@@ -153,7 +153,7 @@ class FlightFlags:
         from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 
         timing: dict[str, Any] = {} if self.preset is None else preset_timing(self.preset)
-        single = (key for key in TIMING_KEYS if key not in _BY_MEASUREMENT)
+        single = (f.name for f in fields(self) if f.name in TIMING_KEYS and f.name not in _BY_MEASUREMENT)
         timing |= {key: value for key in single if (value := self._timed(key)) is not None}
         written = {*timing}
         if (loss := self._timed("loss")) is not None:

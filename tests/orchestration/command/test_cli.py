@@ -30,32 +30,6 @@ from tests.places import EXAMPLES, ROOT
 SCRIPT = shutil.which("quadcosim", path=str(Path(sys.executable).parent))
 SHORT = ("--native", "--stop-time", "0.5")
 
-KEYS = {
-    "engine",
-    "outcome",
-    "good",
-    "horizon",
-    "position_rmse",
-    "position_iae",
-    "position_itae",
-    "position_max",
-    "settling_time",
-    "ultimate_bound",
-    "attitude_error_rmse",
-    "attitude_error_max",
-    "control_effort.thrust",
-    "control_effort.torque",
-    "torque_max",
-    "total_variation.thrust",
-    "total_variation.torque",
-    "energy_growth_share",
-    "saturation_share",
-    "diverged",
-    "divergence_time",
-    "steps",
-    "wall_time",
-}
-
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -148,14 +122,13 @@ def test_run_prints_all_metrics_as_json_and_nothing_else() -> None:
     done = quadcosim("run", *SHORT, "--json")
     printed = json.loads(done.stdout)
     assert printed.pop("verdict").endswith(", sampled every 10 ms")
-    assert set(printed) == KEYS
     assert {**printed, "wall_time": None} == flown()
 
 
 def test_run_prints_its_answer_and_every_metric_on_a_line(main: Main) -> None:
     answer, *lines = main("run", *SHORT).stdout.splitlines()
     assert re.fullmatch(r"bounded: ultimate_bound = \S+ m, expected < 0\.05 m, sampled every 10 ms", answer)
-    assert {line.split()[0] for line in lines} == KEYS - {"divergence_time"}
+    assert {line.split()[0] for line in lines} == flown().keys() - {"divergence_time"}
 
 
 FLAGS: list[tuple[list[str], dict[str, Any]]] = [
