@@ -130,6 +130,8 @@ def load_claim(path: Path) -> Claim:
     """Read a record; raises `UsageError` for an unknown key and a number that is not in the data."""
     try:
         claim = parsed(read_toml(path, "record of a claim"), Claim)
+        if not claim.where:
+            raise UsageError("where = []: expected the page that tells it, and others with its sentence")
         _filled(claim, claim.claim)
         for one in claim.tried:
             _filled(claim, one.number)

@@ -121,6 +121,7 @@ def test_a_claim_with_fewer_than_two_refuters_is_marked(tmp_path: Path) -> None:
         ({"numbers": {"n": "no.json#/cells"}}, "leads to nothing"),
         ({"claim": "{m:g} of 200 settle."}, "'m' is no number of the record"),
         ({"proof": "none"}, "proof"),
+        ({"where": []}, "expected the page that tells it"),
     ],
 )
 def test_what_a_record_may_not_say_is_refused(tmp_path: Path, changes: dict[str, object], said: str) -> None:
