@@ -36,10 +36,10 @@ demo: .venv/.base
 
 SLOW := flight frames gain_scaling show yaw
 # The parts of what is added; laws, plant, algebra, expressions, timetable, master with stubs, files of systems and
-# scenarios; one FMU, built and run. Not flights.
+# scenarios; axes of figures; one FMU, built and run. Not flights of the quadrotor by its FMUs.
 QUICK := $(addprefix tests/,test_additions.py docs/test_claims.py docs/test_metrics.py controller_fmu plant_fmu fmus/test_one_fmu.py fmus/test_mutants.py::test_every_rule_has_a_mutant_that_it_finds fmu_kit/test_algebra.py fmu_kit/test_trajectory.py fmu_kit/test_units.py quadcosim/test_names.py) \
 	$(addprefix tests/orchestration/,systems/expressions systems/schedule/test_timetable.py simulation/engines/test_master.py simulation/engines/batch/test_folds.py systems/schedule/test_order.py \
-	quadrotor/scenarios/test_loop.py quadrotor/scenarios/test_scenario.py quadrotor/scenarios/test_timing.py \
+	quadrotor/scenarios/test_loop.py quadrotor/scenarios/test_scenario.py quadrotor/scenarios/test_timing.py quadrotor/flight/test_figures.py::test_every_axis_of_every_figure_has_a_name_and_a_unit \
 	experiments/studies/test_axes.py experiments/studies/test_study_file.py systems/system simulation/requests/ssp/test_reading.py foundation/basics/test_statistics.py)
 
 check: lint

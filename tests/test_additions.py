@@ -18,7 +18,8 @@ from orchestration.simulation.figures.views import VIEWS
 from orchestration.systems.expressions.operators import OPERATORS
 from orchestration.systems.expressions.reductions import REDUCTIONS
 from orchestration.systems.signals.motions import MOTIONS
-from tests.places import ROOT
+from tests.examples.common import NAMES
+from tests.places import EXAMPLES, ROOT
 from tests.slaves import get, put
 
 PAGES = {path: path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))}
@@ -122,6 +123,14 @@ def test_the_page_of_references_has_every_motion() -> None:
     of_motions = PAGES[ROOT / "docs/references.md"].partition("## Motions by name")[2].partition("\n## ")[0]
     rows = words(*re.findall(r"^\| (`.*?`) \|", of_motions, re.M))
     assert rows == {*MOTIONS}, f"{rows ^ {*MOTIONS}}: expected the same in the table of docs/references.md"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_example_has_its_row_and_its_figure(name: str) -> None:
+    row = f"\n| [{name}]({name}/README.md) | "
+    assert row in (EXAMPLES / "README.md").read_text(encoding="utf-8"), f"examples/README.md: expected a row of {name}"
+    drawn = (EXAMPLES / name / "figure.png").is_file()
+    assert drawn, f"examples/{name}: expected a figure.png, which examples/make_figures.py draws"
 
 
 @pytest.mark.parametrize("file", LISTS_OF_MOTIONS)

@@ -49,13 +49,6 @@ def test_a_limit_that_is_asked_for_is_of_what_there_is(command: list[str]) -> No
     assert all(value_at(system, path) is not None for path in given)
 
 
-def test_every_example_is_on_the_list_and_has_a_figure() -> None:
-    text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
-    for name in NAMES:
-        assert f"[{name}]({name}/README.md)" in text
-        assert (EXAMPLES / name / "figure.png").is_file()
-
-
 def test_the_python_of_the_page_on_systems_works(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
