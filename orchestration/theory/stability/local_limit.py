@@ -184,11 +184,28 @@ def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | 
     return Commensurate(scan=scan, fine=multiples(hyperperiod(others) / LONGEST_HYPERPERIOD))
 
 
+def _naming_values(growth: Growth, span: Range) -> Growth:
+    """The same, whose errors say at which value there is no loop at rest, and what has been found before."""
+    decays = list[float]()
+
+    def named(value: float) -> float:
+        try:
+            found = growth(value)
+        except (NotAnEquilibriumError, ImpreciseError) as error:
+            ends = dict.fromkeys(map(span.text, (min(decays), max(decays)))) if decays else ()
+            before = f"small deviations decay at what was tried before, {' to '.join(ends)}; " if ends else ""
+            raise type(error)(f"{before}at {span.text(value)}: {error}") from error
+        decays.extend([value] if found < 0.0 else [])
+        return found
+
+    return named
+
+
 def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimit:
     """The first value at which small deviations grow, up and down from the system's own, and all that were found."""
     if not rates.scan:
         return LinearLimit(reason="no local limit: several rates, which repeat together at no value of the scan")
-    tried = dict[float, float]()
+    tried, growth = dict[float, float](), _naming_values(growth, span)
 
     def grows(value: float) -> bool:
         tried[value] = growth(value)
@@ -244,7 +261,7 @@ def _narrowed(growth: Growth, bracket: Bracket, fine: list[float]) -> Bracket:
 
 def _first_growth(growth: Growth, span: Range, method: str, finer: float | None) -> LinearLimit:
     """The values between which small deviations decay, by a scan and bisection; without `finer` by secants."""
-    values, growth = span.values(), cache(growth)
+    values, growth = span.values(), cache(_naming_values(growth, span))
     width = span.tolerance * (1.0 if finer is None else finer)
     ends = ends_of_good(lambda value: growth(value) > 0.0, values, span.own, width)
     if finer is None:

@@ -50,6 +50,8 @@ SETTLED = 6
 """periods of the run to rest, after messages in transit have arrived"""
 INSTANTS = 1001
 """instants at which it is seen whether a source changes meanwhile"""
+SETTLING = 100
+"""samples that a component which begins anew is given to settle, its inputs held at those of a rest near by"""
 HELD = 2
 """messages that a first-order hold remembers"""
 
@@ -76,7 +78,7 @@ class Start:
 
     components: Mapping[str, Component]
     saved: Mapping[str, tuple[bytes, float]]
-    """Saved states of the components, and the times of their next steps by their own clocks [s]"""
+    """Saved states of components, and the times of their next steps by their own clocks [s]; others begin anew"""
     held: Mapping[str, Mapping[str, float]]
     """The inputs of the components there"""
     ticking: frozenset[str]
@@ -104,16 +106,22 @@ class Start:
         )
 
     def tuned_to(self, system: System) -> "Start | None":
-        """This one with the tunable parameters of another system; None: more of its components differs."""
+        """This one with the parameters of another system; None: more of its components differs.
+
+        A component whose parameters cannot be set in its saved state has none, and begins anew.
+        """
         if system.components.keys() != self.components.keys():
             return None
-        both = [(name, one.parameters, system.components[name].parameters) for name, one in self.components.items()]
-        differing = {name: {key: new[key] for key in new if old.get(key) != new[key]} for name, old, new in both}
-        tuned = {name: each for name, each in differing.items() if each}
-        components = {name: replace(self.components[name], parameters=new) for name, _, new in both}
-        found = replace(self, components=components, tuned=tuned)
-        is_tunable = self.tunable.issuperset(f"{name}.{key}" for name, each in tuned.items() for key in each)
-        return found if is_tunable and all(o.keys() <= n.keys() for _, o, n in both) and found.serves(system) else None
+        components, saved, tuned = dict[str, Component](), dict(self.saved), dict[str, Mapping[str, Parameter]]()
+        for name, one in self.components.items():
+            old, new = one.parameters, system.components[name].parameters
+            components[name] = replace(one, parameters=new)
+            if old != new:
+                tuned[name] = {key: value for key, value in new.items() if old.get(key) != value}
+                if old.keys() - new.keys() or not self.tunable.issuperset(f"{name}.{key}" for key in tuned[name]):
+                    del saved[name]
+        found = replace(self, components=components, saved=saved, tuned=tuned)
+        return found if found.serves(system) else None
 
     def serves(self, system: System) -> bool:
         """Whether the components of another system can begin there: their states hold parameters, and clocks."""
@@ -322,7 +330,8 @@ def _corrected(calm: System, period: Fraction, instances: Instances, known: Know
         for name, one in ones.items():
             one.begin(near.held[name])
             if (sampling := calm.components[name].sampling) is not None:  # its outputs are those before
-                one.step(one.time - one.later, sampling.period)
+                for _ in range(1 if name in near.saved else SETTLING):
+                    one.step(one.time - one.later, sampling.period)
         saved = {name: one.save() for name, one in ones.items()}
         loop = AtRest(simulation=simulation, saved_states=saved, extra=NO_SIGNALS, period=period, known=known)
         components = [Steady(name, found, near.held[name]) for name, found in loop.tangents.items()]
@@ -537,7 +546,7 @@ class TracedInstance:
             self.fmu.restore(saved)
             for name, value in self._tuned.items():
                 self.fmu.set(name, value)
-            self.writer(list(held), np.array(list(held.values())))()
+        self.writer(list(held), np.array(list(held.values())))()
 
     def exit_initialization(self) -> None:
         """As `Simulator`."""

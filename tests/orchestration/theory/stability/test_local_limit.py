@@ -10,6 +10,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import local_limit
+from orchestration.theory.stability.operating_point import NotAnEquilibriumError
 from orchestration.theory.stability.perturbed_runs import Growth
 
 SPAN = Range(first=0.05, step=0.05, last=1.0, tolerance=5e-3)
@@ -30,6 +31,17 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     assert (found.lower, found.limit) == pytest.approx((0.31, 0.52), abs=2e-9)
     assert "this quantity changes nothing" in local_limit.about_rest(lambda value: at(0.4), SPAN).reason
     assert local_limit.about_rest(at, SPAN).reason == "small deviations grow at 50 ms, where the scan begins"
+
+    def refused(system: System, *_: Any, **__: Any) -> float:
+        if system.stop_time > 0.48:
+            raise NotAnEquilibriumError("no rest")
+        return -1.0
+
+    monkeypatch.setattr(local_limit, "growth_of_loop", refused)
+    assert local_limit.about_rest(at, replace(SPAN, own=0.4)).reason == (
+        "no local limit: small deviations decay at what was tried before, 400 ms to 450 ms; at 500 ms: no rest"
+    )
+    monkeypatch.setattr(local_limit, "growth_of_loop", growth)
     below = local_limit.about_rest(at, replace(SPAN, last=0.48, own=0.4))
     assert below.reason == "small deviations decay from 310 ms to 480 ms, where the scan ends"
 

@@ -12,7 +12,8 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.theory.exact.expect import expect
-from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, keep_start
+from orchestration.theory.stability.fixed_periods import in_fixed_periods
+from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
 from quadcosim import UsageError, linearise, locus
@@ -66,26 +67,27 @@ def test_other_delays_begin_where_the_own_one_has_come_to_rest_also_where_the_lo
 
 
 def test_gains_that_are_unstable_have_poles_at_a_rest_that_no_run_finds(servo: System) -> None:
-    """That of the controller does not move it, that of the amplifier does. If the own one has none, that is said."""
+    """That of the controller does not move it, that of the amplifier does; one that is fixed needs a new instance.
+
+    If the own one has none, that is said.
+    """
     gain, own = "components.controller.parameters.K", 0.96
     with closing(Instances()) as instances:
         expected = growth_of_loop(native_example("dc_servo", {gain: 4.0}), instances)
         assert expected > 0.0
-        for path, of in ((gain, 1.0), ("connections.command.scale", own)):
-            known = KnownTangents()
-            keep_start(servo, instances, known)
+        known = KnownTangents()
+        keep_start(servo, instances, known)
+        assert known.start is not None
+        tunable = known.start
+        fixed = dataclasses.replace(tunable, tunable=frozenset())
+        for path, of, start in ((gain, 1.0, tunable), (gain, 1.0, fixed), ("connections.command.scale", own, tunable)):
+            known.start = start
             found = growth_of_loop(changed(servo, {path: 4.0 / of}), instances, known=known)
             assert found == pytest.approx(expected, rel=1e-6)
+    near = [each.tuned_to(in_fixed_periods(changed(servo, {gain: 4.0}))) for each in (tunable, fixed)]
+    assert [len(each.saved) for each in near if each is not None] == [2, 1]
     with pytest.raises(UsageError, match=rf"{gain} = 4: .*unstable here"):
         locus(dataclasses.replace(servo, operating_point={"after": 0.01}), gain, first=0.96, last=4.0, count=2)
-
-
-def test_only_tunable_parameters_are_set_in_saved_states(servo: System) -> None:
-    tunable = frozenset({"controller.K"})
-    start = Start(components=servo.components, saved={}, held={}, ticking=frozenset(), tunable=tunable)
-    for name, expected in (("K", {"controller": {"K": 2.0}}), ("Ti", None)):
-        near = start.tuned_to(changed(servo, {f"components.controller.parameters.{name}": 2.0}))
-        assert (near and near.tuned) == expected
 
 
 def test_twin_runs_begin_at_the_same_rest(servo: System) -> None:
