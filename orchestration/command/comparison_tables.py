@@ -4,8 +4,9 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
-from orchestration.experiments.comparison.cells import PEAK, VARIATION, CellSummary, Median, Share
+from orchestration.experiments.comparison.cells import FATES, PEAK, VARIATION, CellSummary, Median, Share
 from orchestration.experiments.comparison.design import Comparison
+from orchestration.experiments.comparison.fronts import Difference, Pair
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.experiments.studies.axes import quantity_of
@@ -84,34 +85,40 @@ _UNITS = {"settling_time": ("s", 1.0), "residual": ("mm", 1e3)}
 def comparison_table(comparison: Comparison, outcome: Outcome) -> PrintedTable:
     """A row for each cell: shares that survive and settle, median settling time and residual, with their intervals.
 
-    Columns that are the same in all cells are left out. The numbers are those of `cells.csv`.
+    Columns that are the same in all cells are left out. Shares of other controllers are followed by their differences
+    to those of the first. The numbers are those of `cells.csv`, with these differences.
     """
-    columns = _columns(comparison, outcome.cells)
+    several, first = len(comparison.controllers) > 1, comparison.controllers[0].name
+    by = f"; minus {first}: of pairs from the same one, with 95 % intervals by Newcombe's method" if several else ""
+    pairs = {(one.vehicle, one.condition, one.controller, one.value): one for one in outcome.pairs}
+    found = [(cell, pairs.get((cell.vehicle, cell.condition, cell.controller, cell.value))) for cell in outcome.cells]
+    columns, none = _columns(comparison, found), dict.fromkeys(outcome.pairs[0].differences() if outcome.pairs else ())
     return PrintedTable(
         caption=(
             f"Shares of {len(comparison.initial_conditions)} initial conditions that survive and settle, with 95 % "
-            "Wilson intervals; medians, with intervals of order statistics at 95 %"
+            f"Wilson intervals{by}; medians, with intervals of order statistics at 95 %"
         ),
         heads=[*columns],
         rows=[*zip(*columns.values())],
-        numbers=[cell.row() for cell in outcome.cells],
+        numbers=[cell.row() | (pair.differences() if pair else none) for cell, pair in found],
     )
 
 
-def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> dict[str, list[str]]:
+def _columns(comparison: Comparison, found: Sequence[tuple[CellSummary, Pair | None]]) -> dict[str, list[str]]:
     if comparison.second is not None:  # as the columns are: all of one controller together
         names, conditions = ([one.name for one in ones] for ones in (comparison.controllers, comparison.conditions))
         of_file = [*dict.fromkeys(comparison.on_second[name].condition for name in conditions)]
-        cells = sorted(
-            cells,
-            key=lambda cell: (
-                [one.name for one in comparison.vehicles].index(cell.vehicle),
-                of_file.index(comparison.on_second[cell.condition].condition),
-                names.index(cell.controller),
-                cell.value,
-                conditions.index(cell.condition),
+        found = sorted(
+            found,
+            key=lambda each: (
+                [one.name for one in comparison.vehicles].index(each[0].vehicle),
+                of_file.index(comparison.on_second[each[0].condition].condition),
+                names.index(each[0].controller),
+                each[0].value,
+                conditions.index(each[0].condition),
             ),
         )
+    cells = [cell for cell, _ in found]
     columns = {key: [getattr(cell, key) for cell in cells] for key in ("vehicle", "condition", "controller")}
     if comparison.second is not None:
         columns["condition"] = [comparison.on_second[cell.condition].condition for cell in cells]
@@ -119,18 +126,19 @@ def _columns(comparison: Comparison, cells: Sequence[CellSummary]) -> dict[str, 
     for axis in filter(None, (comparison.axis, comparison.second)):
         quantity, values = quantity_of(axis, {}), [cell.values[axis.name] for cell in cells]
         columns[quantity.title] = [f"{quantity.factor * v:g}" if is_number(v) else str(v) for v in values]
+    for fate in FATES:
+        columns[f"{fate}s"] = [_share(getattr(cell, f"{fate}s"), cell.count) for cell in cells]
+        if any(pair for _, pair in found):
+            minus = f"minus {comparison.controllers[0].name}"
+            columns[f"{fate}s, {minus}"] = [_share(pair.shares[fate], c.count) if pair else "" for c, pair in found]
     columns |= {
-        "survives": [_share(cell.survives, cell.count) for cell in cells],
-        "settles": [_share(cell.settles, cell.count) for cell in cells],
-        **{
-            f"median {name.replace('_', ' ')} [{unit}]": [_median(c.medians[name], factor) for c in cells]
-            for name, (unit, factor) in _UNITS.items()
-        },
+        f"median {name.replace('_', ' ')} [{unit}]": [_median(c.medians[name], factor) for c in cells]
+        for name, (unit, factor) in _UNITS.items()
     }
     return columns
 
 
-def _share(share: Share, count: int) -> str:
+def _share(share: Share | Difference, count: int) -> str:
     return with_interval(share.value, share.low, share.high, decimals_of(count))
 
 

@@ -62,15 +62,15 @@ def _latex_lines(table: PrintedTable) -> Iterator[str]:
     count = _leading(table)  # columns that stand above their rows
     heads, rows = table.heads[count:], [row[count:] for row in table.rows]
     letters, head = _letters(heads, rows), _latex_head(heads, rows)
-    size = rf"\{'footnotesize' if letters <= WIDE else 'scriptsize'}\setlength{{\tabcolsep}}{{4pt}}"
+    size, apart = ("footnotesize", 4) if letters <= WIDE else ("scriptsize", 3)
     above = [tuple(row[:count]) for row in table.rows]
     name = "table" if max([letters, *(len(", ".join(names)) for names in above)]) <= NARROW else "table*"
     starts = _pages(above)
     for start, end in zip(starts, [*starts[1:], len(rows)]):
         yield rf"\begin{{{name}}}  % needs \usepackage{{booktabs}}"
-        yield rf"\centering{size}"
+        yield rf"\centering\{size}\setlength{{\tabcolsep}}{{{apart}pt}}"
         yield from [rf"\caption{{{_latex(table.caption)}}}"] if start == 0 else _CONTINUED
-        yield from [rf"\begin{{tabular}}{{{'l' * len(heads)}}}", *head]
+        yield from [rf"\begin{{tabular}}{{@{{}}{'l' * len(heads)}@{{}}}}", *head]
         for place in range(start, end):
             if count and (place == start or above[place] != above[place - 1]):
                 yield from [] if place == start else [r"\midrule"]

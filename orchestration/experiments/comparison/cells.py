@@ -207,8 +207,13 @@ def tables_of_maps(
     stands_for = {name: one.condition for name, one in comparison.on_second.items()}
     done = table[table["status"] == "done"]
     for of, rows in done.groupby([VEHICLE, done[CONDITION].map(stands_for)], sort=False):
-        for fate, has in FATES.items():  # random, since initial conditions are drawn
-            yield of, fate, rows.assign(**{GOOD: has(rows), RANDOM: True, PAIR: rows[START]})
+        for fate, has in FATES.items():
+            yield of, fate, as_drawn(rows, has)
+
+
+def as_drawn(table: "pd.DataFrame", has: "Fate") -> "pd.DataFrame":
+    """Runs such as `shares_of` reads: good if they have a fate, random and paired by their initial conditions."""
+    return table.assign(**{GOOD: has(table), RANDOM: True, PAIR: table[START]})
 
 
 def sizes(comparison: Comparison, table: "pd.DataFrame") -> "pd.Series":

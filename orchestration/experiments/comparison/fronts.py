@@ -1,12 +1,13 @@
 """Controllers against each other: Pareto fronts of error and effort, and pairs of each with the first."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from orchestration.experiments.comparison.cells import Median, settled, survived
+from orchestration.experiments.comparison.cells import FATES, Median, as_drawn, settled, survived
 from orchestration.experiments.comparison.design import CONDITION, CONTROLLER, START, VEHICLE, Comparison
 from orchestration.experiments.studies.axes import Value
+from orchestration.experiments.studies.shares import TwoLaws, differences_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,6 +71,15 @@ def _dominates(one: tuple[float | None, float | None], other: tuple[float | None
     return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """The share of one controller that has a fate minus that of another, with Newcombe's interval for pairs at 95 %."""
+
+    value: float
+    low: float
+    high: float
+
+
 _RATIOS = 2
 """reported for a pair: error and effort"""
 
@@ -94,10 +104,22 @@ class Pair:
     effort: Median
     """medians of the ratio of its value to that of the first where both survive; the intervals hold for all pairs of
     the comparison together (Bonferroni)"""
+    shares: Mapping[str, Difference]
+    """Its shares minus those of the first, by fate; each interval for itself"""
 
     def row(self) -> dict[str, Any]:
         """The row of the table."""
-        return {**vars(self), **self.error.columns("error"), **self.effort.columns("effort")}
+        row = {**vars(self), **self.error.columns("error"), **self.effort.columns("effort"), **self.differences()}
+        del row["shares"]
+        return row
+
+    def differences(self) -> dict[str, float]:
+        """The columns of the differences of shares."""
+        return {
+            f"{fate}s.difference{end}": value
+            for fate, one in self.shares.items()
+            for end, value in (("", one.value), (".low", one.low), (".high", one.high))
+        }
 
 
 def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
@@ -106,6 +128,7 @@ def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
     done = table[table["status"] == "done"]
     places = len(comparison.vehicles) * len(comparison.conditions) * len(comparison.values)
     confidence = 1.0 - 0.05 / max(1, len(others) * places * _RATIOS)
+    shares = _shares(comparison, done)
     for (vehicle, condition, value), rows in done.groupby([VEHICLE, CONDITION, comparison.axis.name], sort=False):
         by_name = {name: one.set_index(START) for name, one in rows.groupby(CONTROLLER, sort=False)}
         if first not in by_name:
@@ -113,7 +136,25 @@ def pairs(comparison: Comparison, table: "pd.DataFrame") -> Iterator[Pair]:
         for name in others:
             if name in by_name:
                 place = {"vehicle": vehicle, "condition": condition, "value": value}
-                yield _pair(comparison, place, name, by_name[name], by_name[first], confidence)
+                known = {fate: found[vehicle, condition, value, name] for fate, found in shares.items()}
+                yield _pair(comparison, place, name, by_name[name], by_name[first], confidence, known)
+
+
+def _shares(comparison: Comparison, done: "pd.DataFrame") -> dict[str, dict[tuple[Any, ...], Difference]]:
+    """The differences of shares to those of the first controller by fate, then by place and controller."""
+    first, *others = (one.name for one in comparison.controllers)
+    where = [VEHICLE, CONDITION, comparison.axis.name]
+    found: dict[str, dict[tuple[Any, ...], Difference]] = {}
+    for fate, has in FATES.items():
+        judged = as_drawn(done, has)
+        for name in others:
+            both = judged[judged[CONTROLLER].isin((first, name))]
+            rows = differences_of(both, [*where, CONTROLLER], TwoLaws(CONTROLLER, first, name))
+            for row in rows.to_dict("records"):
+                key = (*(row[each] for each in where), name)
+                ends = {"value": row["difference"], "low": row["low"], "high": row["high"]}
+                found.setdefault(fate, {})[key] = Difference(**ends)
+    return found
 
 
 def _pair(
@@ -123,6 +164,7 @@ def _pair(
     it: "pd.DataFrame",
     other: "pd.DataFrame",
     confidence: float,
+    shares: Mapping[str, Difference],
 ) -> Pair:
     known = it.index.intersection(other.index)
     mine, its = survived(it.loc[known]), survived(other.loc[known])
@@ -145,4 +187,5 @@ def _pair(
         settles=int(ahead),
         error=ratios[0],
         effort=ratios[1],
+        shares=shares,
     )

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pandas as pd
@@ -279,8 +280,12 @@ def test_two_axes_make_cells_over_both_and_a_map_of_the_two_laws(
 @pytest.mark.parametrize(
     ("form", "first", "fourth"),
     [
-        ("markdown", "| controller | period [ms] | loss | survives |", "| coupled | 20 | 0.3 | 1.00 [0.34, 1.00] |"),
-        ("latex", r"\begin{table*}  % needs \usepackage{booktabs}", r"\begin{tabular}{lllllll}"),
+        (
+            "markdown",
+            "| controller | period [ms] | loss | survives | survives, minus coupled |",
+            "| coupled | 20 | 0.3 | 1.00 [0.34, 1.00] |  |",
+        ),
+        ("latex", r"\begin{table*}  % needs \usepackage{booktabs}", r"\begin{tabular}{@{}lllllllll@{}}"),
         ("csv", "cell,vehicle,condition,controller,period,loss,count,", "2,base,loss 0,uncoupled,0.02,0.0,2,"),
     ],
 )
@@ -293,7 +298,16 @@ def test_a_comparison_is_printed_as_a_table(
     assert not [*Path("results").rglob("*.png")], "a table is printed without pictures"
     assert lines[0].startswith(first)
     assert lines[3].startswith(fourth)
-    assert form == "csv" or "Shares of 2 initial conditions" in "".join(lines)
+    if form != "csv":
+        assert "Shares of 2 initial conditions" in "".join(lines)
+        assert "minus coupled: of pairs from the same one" in "".join(lines)
+        return
+    cells = pd.read_csv(StringIO("\n".join(lines))).set_index(["loss", "period", "controller"])
+    has = cells["survives.difference"].notna()
+    assert has.tolist() == cells.index.isin(["uncoupled"], level="controller").tolist()
+    one, other = (cells.loc[(0.3, 0.05, law)] for law in ("uncoupled", "coupled"))
+    assert one["settles.difference"] == one["settles.share"] - other["settles.share"]
+    assert one["settles.difference.low"] <= one["settles.difference"] <= one["settles.difference.high"]
 
 
 def test_an_unknown_table_or_a_third_axis_is_refused(folder: Path, main: Main) -> None:

@@ -15,6 +15,8 @@ from orchestration.experiments.comparison.fronts import pairs
 from orchestration.experiments.comparison.limits import first_ends, limits
 from orchestration.experiments.comparison.outcome import as_json, outcome_of
 from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.studies.shares import interval_of_difference
+from orchestration.foundation.basics.statistics import pair_correlation, wilson
 from orchestration.systems.system.starts import Starts
 from quadcosim import Scenario
 
@@ -176,6 +178,17 @@ def test_pairs_are_counted_and_compared_start_by_start(comparison: Comparison, t
     assert (pair.error.value, pair.error.low, pair.error.high) == (0.5, 0.5, 0.5)
     assert pair.effort.value == pytest.approx(2.0)
     assert pair.settles == sum(map(settles, range(28))) - sum(map(settles, range(36))) == -6  # all starts count
+    low, high = interval_of_difference(
+        {"share": 28 / 40, **ends_of(28, 40)}, {"share": 36 / 40, **ends_of(36, 40)},
+        correlation=pair_correlation(28, 0, 8, 4),
+    )  # fmt: skip
+    assert vars(pair.shares["survive"]) == pytest.approx({"value": -0.2, "low": low, "high": high})
+    assert pair.row()["settles.difference"] == pytest.approx(-6 / 40)
+    assert "shares" not in pair.row()
+
+
+def ends_of(count: int, runs: int) -> dict[str, float]:
+    return dict(zip(("low", "high"), wilson(count, runs)))
 
 
 def test_the_intervals_of_pairs_hold_for_all_of_them_together(comparison: Comparison, table: pd.DataFrame) -> None:

@@ -426,7 +426,7 @@ def test_a_long_name_of_several_rows_stands_above_them_instead_of_in_a_column() 
     rows = [[name, period, "0.50"] for name in ("unified law, tuned", "cascade") for period in ("10", "20")]
     text = [*lines(PrintedTable(caption="", heads=["law", "period", "share"], rows=rows, numbers=[]), "latex")]
     assert text[3:] == [
-        r"\begin{tabular}{ll}", r"\toprule", r"period & share \\", r"\midrule",
+        r"\begin{tabular}{@{}ll@{}}", r"\toprule", r"period & share \\", r"\midrule",
         r"\multicolumn{2}{l}{unified law, tuned} \\", r"10 & 0.50 \\", r"20 & 0.50 \\", r"\midrule",
         r"\multicolumn{2}{l}{cascade} \\", r"10 & 0.50 \\", r"20 & 0.50 \\",
         r"\bottomrule", r"\end{tabular}", r"\end{table}",
