@@ -1,6 +1,7 @@
 """The flags of a run of one FMU."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ from orchestration.command.flags import FlightFlags, assigned
 from orchestration.command.options import option
 from orchestration.command.registry import expect_positive
 from orchestration.components.fmi.access import INTERFACES, SCHEDULED, SOLVERS
-from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.errors import SimulatorError, UsageError, expected_name
 from orchestration.foundation.basics.terminal import inform, warn
 
 if TYPE_CHECKING:
@@ -85,6 +86,17 @@ class OneFmuFlags:
         if late := late_jump(system):
             warn(f"{self.inputs}: {late}")
         return replace(flags, stop_time=None, set=None).applied_to_system(system)
+
+    @contextmanager
+    def rows_kept(self, path: Path | None) -> Iterator[None]:
+        """Write the file of `--output` also where the FMU at `path` ends the run in the block, and say so."""
+        try:
+            yield
+        except SimulatorError as ended:
+            if path is not None and self.output is not None and ended.result is not None:
+                self.write(path, ended.result)
+                ended.args = (f"{ended}; the rows until then are in {self.output}",)
+            raise
 
     def write(self, path: Path, result: "Result") -> None:
         """Write the file of `--output`, of a run of the FMU at `path`."""

@@ -73,7 +73,7 @@ def run(
         one_fmu.expect_none()
     if pause_at is not None and out is None:
         raise UsageError("--pause-at: expected --out DIR for the state")
-    with progress_bar("running") as progress:
+    with one_fmu.rows_kept(fmu), progress_bar("running") as progress:
         how: Any = {"progress": progress, "announce": inform, "engine": engine_named(engine), **vars(process)}
         result: Result | None
         if resume is not None:

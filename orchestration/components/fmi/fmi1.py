@@ -39,10 +39,11 @@ class Fmi1Instance(Fmi2Instance):
     """Times of the initialisation that waits [s]; None: there is none"""
 
     def _instantiate(self, folder: Path) -> Any:
-        fmu = FMU1Slave(
-            guid=self.description.guid, modelIdentifier=self.model.capabilities.modelIdentifier,
-            unzipDirectory=str(folder), instanceName=self.name,
-        )  # fmt: skip
+        with slaves.in_terms_of_the_archive(folder):
+            fmu = FMU1Slave(
+                guid=self.description.guid, modelIdentifier=self.model.capabilities.modelIdentifier,
+                unzipDirectory=str(folder), instanceName=self.name,
+            )  # fmt: skip
         callbacks = slaves.collecting_callbacks(self._messages, self.name, folder)  # those of FMI 1.0 are its first
         fmu.instantiate(functions=fmi1.fmi1CallbackFunctions.from_buffer(callbacks), loggingOn=True)
         if fmu.component is None:

@@ -26,6 +26,13 @@ INTEGERS: Mapping[str, type[np.signedinteger[Any] | np.unsignedinteger[Any]]] = 
 """The numpy type of each integer type"""
 
 
+NO_STATE = (
+    "cannot save its state; expected canGetAndSetFMUstate and canSerializeFMUstate in its description, an option of "
+    "many tools that export FMUs"
+)
+"""What is said of an FMU whose state is to be saved, but is not"""
+
+
 def convert_value(variable: Variable, value: object, place: str) -> Value:
     """Convert `value` to the type of the variable, an item of an enumeration to its number.
 

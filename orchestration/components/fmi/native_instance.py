@@ -21,7 +21,7 @@ from fmu_kit import scratch
 from fmu_kit.scratch import Scratch
 from orchestration.components.fmi import slaves
 from orchestration.components.fmi.access import USUAL, Access
-from orchestration.components.fmi.instance import Instance, Value, convert_value, same
+from orchestration.components.fmi.instance import NO_STATE, Instance, Value, convert_value, same
 from orchestration.components.fmi.read_description import Variable, read_model
 from orchestration.components.fmi.surroundings import FOLDER, LIMITS, ROUNDING, Surroundings, sentence
 from orchestration.components.fmi.transfers import Numbers, TransferCall, TransferLayout, TransferPart
@@ -419,10 +419,7 @@ class NativeInstance(Instance):
 
     def _expect_state(self) -> None:
         if not self.model.saves_state:
-            raise UsageError(
-                f"{self.name}: {self.model.name} cannot save its state: its description does not declare that it can "
-                "get, set and serialise it"
-            )
+            raise UsageError(f"{self.name}: {self.model.name} {NO_STATE}")
 
     def collect_warnings(self) -> None:
         """Process the messages of the FMU: keep the warnings."""

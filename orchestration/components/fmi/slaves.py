@@ -8,8 +8,11 @@ pythonfmu 0.7.0, with which FMUs in Python are built, has peculiarities that mat
 
 import ctypes
 import itertools
+import os
+import re
 import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -270,15 +273,31 @@ def folder_here(version: int, folders: Sequence[str]) -> str:
 def load_slave(
     version: int, folder: Path, *, token: str, identifier: str, name: str, interface: Interface = "co-simulation"
 ) -> Any:
-    """Load the library of an FMU that is unpacked in `folder`, for an instance `name`; `token` is its GUID."""
+    """Load the library of an FMU that is unpacked in `folder`, for an instance `name`; `token` is its GUID.
+
+    Raises `QuadcosimError` if it cannot be loaded.
+    """
     arguments = {"guid": token, "unzipDirectory": str(folder), "modelIdentifier": identifier, "instanceName": name}
     exchange = interface == "model-exchange"
+    kind: Callable[..., Any] = FMU2Model if exchange else FMU2Slave
     if version == 3:
-        scheduled = interface == SCHEDULED
-        return (FMU3Model if exchange else FMU3ScheduledExecution if scheduled else FMU3Slave)(**arguments)
-    here = folder_here(version, sorted(each.name for each in (folder / "binaries").iterdir()))
-    library = folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}"
-    return (FMU2Model if exchange else FMU2Slave)(**arguments, libraryPath=str(library))
+        kind = FMU3Model if exchange else FMU3ScheduledExecution if interface == SCHEDULED else FMU3Slave
+    else:
+        here = folder_here(version, sorted(each.name for each in (folder / "binaries").iterdir()))
+        library = folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}"
+        arguments["libraryPath"] = str(library)
+    with in_terms_of_the_archive(folder):
+        return kind(**arguments)
+
+
+@contextmanager
+def in_terms_of_the_archive(folder: Path) -> Iterator[None]:
+    """Have errors about a library, of which fmpy raises any kind, name it by its place in the FMU, once."""
+    try:
+        yield
+    except Exception as error:
+        text = str(error).replace(f"{folder}{os.sep}", "")
+        raise QuadcosimError(re.sub(r"^Failed to load shared library (.+)\. (?=\1)", "", text)) from error
 
 
 def instantiate(slave: Any, messages: list[Message], interface: Interface = "co-simulation") -> None:

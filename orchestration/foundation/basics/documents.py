@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import Any
 
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import WHOLE_NUMBER, UsageError, shown
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -152,7 +152,7 @@ def _expect_plain(value: Any, place: str) -> None:
         if isinstance(value, str) and "\0" in value:
             raise UsageError(f"{place} = {shown(repr(value))}: expected text without NUL characters")
         if isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise UsageError(f"{place}: expected a whole number from -2^63 to 2^63 - 1")
+            raise UsageError(f"{place}: expected {WHOLE_NUMBER}")
         if isinstance(value, Mapping):
             items = [(str(key), item) for key, item in value.items()]
         elif isinstance(value, Sequence) and not isinstance(value, str):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from typing_extensions import dataclass_transform
 
-from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
+from orchestration.foundation.basics.errors import WHOLE_NUMBER, UsageError, no_such_key, shown
 from orchestration.foundation.basics.fitting import Before, MisfitError, fitted, hints_of
 from orchestration.foundation.processes.passable import passable
 
@@ -246,7 +246,7 @@ def _first_problem(error: "pydantic.ValidationError", place: str, kwargs: Mappin
     at = place + ".".join(map(str, parts))
     alike = {each["type"] for each in problems if _place(each["loc"], kwargs)[0] == parts}
     if alike & {"less_than", "greater_than_equal"}:
-        return f"{at}: expected a whole number from -2^63 to 2^63 - 1"
+        return f"{at}: expected {WHOLE_NUMBER}"
     if first["type"] == "literal_error":
         words = re.findall(r"'([^']*)'", first["ctx"]["expected"])
         return f"{at} = {shown(value)}: expected one of {', '.join(words)}"

@@ -145,14 +145,13 @@ def _common(one: Fraction, other: Fraction) -> Fraction:
 def _clock(model: Model, name: str, record: Sequence[str], interval: float | None) -> Sampling | None:
     """The ticks of the fastest clock of an FMU; None: it has none that ticks.
 
-    Raises `UsageError`, with the lines of the system that makes it run, for one whose variables or clocks need more.
+    Raises `UsageError`, with the command that makes it a system, for one whose variables or clocks need more.
     """
     if model.interface == SCHEDULED:
         clocks = [clock.name for clock in model.clocks]
         raise UsageError(
-            f"{model.path}: is for scheduled execution, in which each of its clocks has a partition; expected run "
-            f"FILE.toml, with a component for each of {', '.join(clocks)}, as in: [components.{clocks[0]}], fmu = "
-            f'"{model.path.name}", partition = "{clocks[0]}", sampling = {{ period = SECONDS }}'
+            f"{model.path}: is for scheduled execution, in which each of its clocks has a partition: "
+            f"{', '.join(clocks)}; expected a system of them, {_as_system(model)}"
         )
     if not model.ticking:
         try:
@@ -166,19 +165,19 @@ def _clock(model: Model, name: str, record: Sequence[str], interval: float | Non
     clock, written = model.ticking[0], set(record or outputs(model))
     between = [v.name for v in model.description.modelVariables if v.name in written and not v.clocks]
     if between or (clock.interval is None and interval is None):
-        stated = "" if clock.interval is not None else ", period = SECONDS"
         ticked = [v.name for v in model.description.modelVariables if v.clocks and v.causality == "output"]
         what, needed = f"its clock {clock.name} states no interval", "--output-interval SECONDS"
         if between:
             what = f"{listed(between)} may change between the ticks of its clocks, the times of all rows"
             needed = f"--record of outputs that do not, {listed(ticked)}"
-        raise UsageError(
-            f"{model.path}: {what}; expected {needed}, or run FILE.toml, with these lines in the file: "
-            f'[components.{name}], fmu = "{model.path.name}", sampling = {{ fmu_clock = "{clock.name}"{stated} }}; '
-            f'inputs from a CSV file: [sources.inputs], file, to = ["{name}.INPUT"]'
-        )
+        raise UsageError(f"{model.path}: {what}; expected {needed}, or a system, {_as_system(model)}")
     period = float(clock.interval or 0) if interval is None else interval
     return Sampling(period=period, offset=float(clock.shift), fmu_clock=clock.name)
+
+
+def _as_system(model: Model) -> str:
+    """The command that proposes a file with what of an FMU ticks, for a message."""
+    return f"of which quadcosim connect {model.path} --out FILE.toml writes the lines, and run FILE.toml"
 
 
 def _time(model: Model, key: str) -> float | None:

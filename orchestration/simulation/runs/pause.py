@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.new_files import clear, new_file, write_atomically
+from orchestration.components.fmi.instance import NO_STATE
 from orchestration.components.fmi.trust import content_hash
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
@@ -174,7 +175,7 @@ def _expect_states(simulation: PreparedRun) -> None:
     """Raise `UsageError` naming the components whose state cannot be saved."""
     without = [name for name, instance in simulation.instances.items() if not instance.model.saves_state]
     if without:
-        raise UsageError(f"pause: the FMU of {', '.join(without)} cannot save its state; expected FMUs that can")
+        raise UsageError(f"pause: the FMU of {', '.join(without)} {NO_STATE}")
 
 
 def _expect_same(paused: dict[str, str], simulation: PreparedRun, folder: Path) -> None:

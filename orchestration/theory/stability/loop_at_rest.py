@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from orchestration.components.fmi.access import USUAL, Access
-from orchestration.components.fmi.instance import Instance, Loader
+from orchestration.components.fmi.instance import NO_STATE, Instance, Loader
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
@@ -443,7 +443,7 @@ def _expect_period(system: System) -> Fraction:
 def _expect_states(simulation: PreparedRun) -> None:
     without = [name for name, instance in simulation.instances.items() if not instance.model.saves_state]
     if without:
-        raise UsageError(f"the FMU of {', '.join(without)} cannot save its state")
+        raise UsageError(f"the FMU of {', '.join(without)} {NO_STATE}")
 
 
 def _expect_open_instants(simulation: PreparedRun) -> None:

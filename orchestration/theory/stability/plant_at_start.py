@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestration.components.fmi.adapted import AdaptedInstance
-from orchestration.components.fmi.instance import Instance
+from orchestration.components.fmi.instance import NO_STATE, Instance
 from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import Model, declared_of, read_model
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
@@ -117,7 +117,7 @@ def _sampled(instance: Instance, period: float, step: float) -> PlantAtStart:
     """From sample to sample, by pulses on its inputs, in steps of about `step` [s]."""
     model = instance.model
     if not model.saves_state:
-        raise UsageError(f"{model.path}: cannot save its state, which is linearised by returning to it")
+        raise UsageError(f"{model.path}: {NO_STATE}")
     inputs, outputs = model.names("input", kinds=("Real",)), model.names("output", kinds=("Real",))
     held, before, after = np.zeros(len(inputs)), np.zeros(len(outputs)), np.zeros(len(outputs))
     instance.reader(inputs, held)()

@@ -129,14 +129,24 @@ def test_periodic_clocks_tick_and_what_may_change_between_ticks_needs_a_system(m
     assert out.read_text().split() == ['"time","y"', "0.0,-1.0", "0.5,-1.0", "1.0,-5.0", "1.5,-5.0", "2.0,-5.0"]
     refused = main("run", fmu, code=2).stderr
     assert "law.fmu: period, misused, ticks, slow_ticks may change between the ticks of its clocks" in refused
-    assert "expected --record of outputs that do not, y, or run FILE.toml, with these lines in the file: " in refused
-    assert 'sampling = { fmu_clock = "fast" }; inputs from a CSV file: [sources.inputs]' in refused
+    assert "expected --record of outputs that do not, y, or a system, of which quadcosim connect" in refused
     fmu = law(here, clock("fast", "fixed", ""))
     assert "its clock fast states no interval; expected --output-in" in main("run", fmu, "--record", "y", code=2).stderr
     main("run", fmu, "--in-process", "--record", "y", "--output-interval", "0.25", "--output", out)
     assert len(out.read_text().split()) == 6
     refused = main("run", partitions(here), code=2).stderr
-    assert 'a component for each of inClock1, inClock2, inClock3, as in: [components.inClock1], fmu = "clo' in refused
+    assert "a partition: inClock1, inClock2, inClock3; expected a system of them, of which quadcosim conn" in refused
+
+
+@needs_compiler
+def test_the_rows_until_a_crash_are_in_the_file(main: Main, here: Path) -> None:
+    fmu = known(small(here, "ENDS=abort()"))
+    said = main("run", fmu, "--output", "out.csv", "--output-interval", "0.01", code=1).stderr
+    assert "ended by SIGABRT" in said
+    assert "; the rows until then are in out.csv" in said
+    assert [row.split(",")[0] for row in Path("out.csv").read_text().split()[1:]] == [
+        "0.0", "0.01", "0.02", "0.03", "0.04", "0.05"
+    ]  # fmt: skip
 
 
 def numbers(rows: list[str]) -> list[float]:

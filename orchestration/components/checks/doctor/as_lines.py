@@ -55,13 +55,18 @@ def _fmu_rows(verdict: Verdict, machine: Machine) -> Iterator[Row]:
         yield "file", problem, True
     for problem in verdict.elsewhere:
         yield "elsewhere", problem, False
-    yield _host_row("Python host", "fmpy and others", verdict.python_host)
-    yield _host_row("other host", "Simulink, Modelica tools, C", verdict.other_host)
+    loads = verdict.failure is None
+    yield _host_row("Python host", "fmpy and others", verdict.python_host, loads=loads)
+    yield _host_row("other host", "Simulink, Modelica tools, C", verdict.other_host, loads=loads)
     yield "tried here", "loads" if verdict.failure is None else verdict.failure, verdict.failure is not None
 
 
-def _host_row(label: str, examples: str, host: Host) -> Row:
-    ready = "ready" if host.start is None else f"start it as {host.start}"
+def _host_row(label: str, examples: str, host: Host, *, loads: bool) -> Row:
+    ready = (
+        ("ready" if loads else "the libraries that it names are here")
+        if host.start is None
+        else f"start it as {host.start}"
+    )
     parts = [ready if host.ready else f"needs {'; '.join(host.needs)}", *filter(None, [host.note])]
     return label, f"{examples}: {'; '.join(parts)}", not host.ready
 

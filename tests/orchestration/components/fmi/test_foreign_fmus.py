@@ -268,7 +268,7 @@ def test_a_value_of_an_objective_that_is_not_finite_is_a_warning_that_names_it(t
 def test_without_saved_states_asking_for_one_is_refused_by_name(fmi: int, tmp_path: Path) -> None:
     with prepared(alone(small(tmp_path, fmi=fmi, saves=False), array=fmi == 3)) as simulation:
         simulation.master.initialise()
-        with pytest.raises(UsageError, match=r"^it: Small cannot save its state: its description does not declare"):
+        with pytest.raises(UsageError, match=r"^it: Small cannot save its state; expected canGetAndSetFMUstate"):
             simulation.master.saved()
 
 

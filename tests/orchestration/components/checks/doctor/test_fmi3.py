@@ -11,6 +11,7 @@ from orchestration.components.checks.doctor.loading import try_loading
 from orchestration.components.checks.doctor.report import DoctorReport, examine
 from orchestration.components.checks.doctor.verdict import judge
 from orchestration.foundation.processes.resource_limits import Limits
+from tests.commands import Main
 from tests.orchestration.components.checks.doctor.common import (
     AARCH64,
     changed,
@@ -88,9 +89,10 @@ def test_what_is_for_scheduled_execution_is_not_tried(fmu: Path, tmp_path: Path)
     assert trial.failure == "not tried: it is for scheduled execution only"
 
 
-def test_a_library_without_the_functions_of_fmi_3_does_not_load(fmu: Path, tmp_path: Path) -> None:
+def test_a_library_without_the_functions_of_fmi_3_does_not_load_and_nothing_says_that_it_is_ready(
+    fmu: Path, tmp_path: Path, main: Main
+) -> None:
     two = files_of(small(tmp_path))[f"binaries/{fmpy.platform}/Small{fmpy.sharedLibraryExtension}"]
-    failure = try_loading(changed(fmu, tmp_path / "a.fmu", {HERE: two}), Limits()).failure
-    assert failure is not None
-    assert failure.startswith("loading: ")
-    assert "undefined symbol: fmi3" in failure
+    said = main("doctor", changed(fmu, tmp_path / "a.fmu", {HERE: two}), code=1).stdout
+    assert f"loading: {HERE}: undefined symbol: fmi3" in said, "not by the folder in which it was unpacked"
+    assert ": ready" not in said
