@@ -121,9 +121,14 @@ class Bode:
 
     @property
     def phases(self) -> Floats:
-        """Phases without jumps [deg], shape (loops, n), from between -270 and 90 at the lowest frequency."""
+        """Phases without jumps [deg], shape (loops, n), from between -270 and 90 at the lowest frequency.
+
+        Those of a loop whose margin would be at +180 are whole turns lower, so that it is at -180.
+        """
         phases = np.degrees(np.unwrap(np.angle(self.gains), axis=-1))
         unturned: Floats = phases - 360.0 * np.ceil((phases[:, :1] - 91.0) / 360.0)
+        for phase, loop in zip(unturned, self.loops):
+            phase -= max(0.0, critical_phase(loop, self.frequencies, phase) + 180.0)
         return unturned
 
     @property
@@ -160,6 +165,16 @@ class Bode:
         chosen = style_named(style)
         with chosen.applied():
             return Figures({"bode": bode_figure(self, chosen)}, chosen)
+
+
+def critical_phase(loop: LoopMargins, frequencies: Floats, phase: Floats) -> float:
+    """The phase of -1 from which a loop has its margin on the course of its phase [deg]: -180 and whole turns."""
+    at, turn = loop.crossover, loop.phase_margin
+    if at is None or turn is None:
+        at, turn = next((one.frequency for one in loop.gain_margins), None), 0.0
+    if at is None:
+        return -180.0
+    return 360.0 * round((float(np.interp(at, frequencies, phase)) - turn + 180.0) / 360.0) - 180.0
 
 
 def bode(request: RequestLike, component: str | None = None) -> Bode:

@@ -15,7 +15,7 @@ from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES,
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal
 from orchestration.simulation.results.quantities import setting
-from orchestration.theory.stability.frequency import Bode, LoopMargins
+from orchestration.theory.stability.frequency import Bode, LoopMargins, critical_phase
 from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step_response import Step
 
@@ -42,6 +42,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     figure = style.figure(66.0)
     above, middle, below = figure.subplots(3, sharex=True)
     several = len(result.outputs) > 1
+    margins = [0.0]
     for i, (gain, phase, output) in enumerate(zip(result.gains, result.phases, result.outputs, strict=True)):
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
@@ -53,6 +54,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
         middle.plot(result.frequencies, phase, **how)
         below.plot(result.frequencies, _decibels(np.abs(1.0 / (1.0 + gain))), **how)
         if loop is not None:
+            margins.append(critical_phase(loop, result.frequencies, phase) + min(0.0, loop.phase_margin or 0.0))
             _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=not several)
     if not result.stable:
         above.set_title("closed, the loop is unstable: it has no margins")
@@ -60,9 +62,12 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
         axes.axhline(0.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.axhline(-180.0, color=GREY, linewidth=1.0, linestyle=":")
     lowest, highest = middle.dataLim.intervaly
-    lowest = max(lowest, min(LOWEST_PHASE, highest - 360.0))
+    lowest = max(lowest, min(LOWEST_PHASE, highest - 360.0, *margins))
     beyond = 0.15 * (highest - lowest)
     low, high = middle.set_ylim(lowest - beyond, highest + beyond)
+    for turns in range(math.ceil((low + 180.0) / 360.0), math.floor((high + 180.0) / 360.0) + 1):
+        if turns:
+            middle.axhline(360.0 * turns - 180.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
     above.secondary_xaxis("top", functions=(lambda w: w / math.tau, lambda f: f * math.tau)).set_xlabel(

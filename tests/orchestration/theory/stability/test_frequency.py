@@ -343,3 +343,23 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == pytest.approx(peak)
     assert repr(bode_of("dc_servo")) == f"<Bode: {document['verdict']}>"
     assert repr(step_of("dc_servo")) == f"<Step: {step_of('dc_servo').verdict}>"
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "critical"), [(90.0, 210.0, -180.0), (0.0, -870.0, -900.0), (-90.0, -150.0, -180.0)]
+)
+def test_a_phase_margin_is_drawn_from_a_dotted_line(start: float, end: float, critical: float) -> None:
+    """Of a plant that rotates ahead, of a long delay, and of an integrator."""
+    frequencies = np.geomspace(0.1, 10.0, 401)
+    phases = start + (end - start) * np.log10(frequencies / 0.1)
+    phases[200:] = end
+    (known,) = bode_of("dc_servo").loops
+    loop = dataclasses.replace(known, crossover=1.0, phase_margin=30.0, gain_margins=())
+    gains = np.array([np.exp(1j * np.radians(phases)) / frequencies])
+    drawn = dataclasses.replace(bode_of("dc_servo"), loops=(loop,), frequencies=frequencies, gains=gains)
+    assert np.interp(1.0, frequencies, drawn.phases[0]) == pytest.approx(critical + 30.0)
+    _, phase, _ = drawn.plot()["bode"].axes
+    assert np.asarray(phase.lines[1].get_ydata()) == pytest.approx([critical, critical + 30.0])
+    dotted = [float(np.asarray(line.get_ydata())[0]) for line in phase.lines if line.get_linestyle() == ":"]
+    assert critical in dotted
+    assert phase.get_ylim()[0] < critical
