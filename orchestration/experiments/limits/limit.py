@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
 from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
-from orchestration.foundation.basics.bisection import DIGITS, Bracket, Range, bisected, ends_of_good
+from orchestration.foundation.basics.bisection import DIGITS, Bracket, Range, bisected, ends_of_good, first_failure
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.terminal import ShareProgress, inform_in_passing, share_reporter
-from orchestration.foundation.basics.unit_algebra import quantity
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
@@ -76,9 +77,6 @@ def limit(
     units = checks[0].units
     random = varied.at(span.last).depends_on_seed
     seeds = math.ceil(math.log(1.0 - confidence) / math.log(RELIABILITY)) if random else 1
-    with share_reporter(progress, "limits by linear theory"):  # without shares, as it ends where the limit is
-        local = _by_theory("local", files, local_limits, varied, span)
-        mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
     with share_reporter(progress, "longest search") as report, RunEvaluator(files, workers, execution.engine) as pool:
         announce = announce or (lambda line: None)
         if engine == "auto":
@@ -105,7 +103,13 @@ def limit(
                 trials.fails(value)
         ideal = _continuous_run(near, pool) if near is not None else None
         report(1.0)
+    failed = tuple(value for value, one in trials.tried.items() if not one.is_good)
+    with share_reporter(progress, "limits by linear theory"):  # without shares, as it ends where the limit is
+        local = _by_theory("local", files, local_limits, varied, replace(span, also=failed))
+        mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
+    scheduled = sorted(trials.tried) if varied.system.computers or varied.system.networks else []
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
+    note += _starved(varied, span, scheduled) if local.limit is None else []
     note += other_periods_in_words(varied.at(span.last), models)
     metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
     tried = trials.measuring(metric)
@@ -116,7 +120,7 @@ def limit(
         local_accuracy=local.accuracy, local_lower_limit=local.lower, mean_square_limit=mean_square.limit,
         large_signal_limit=None if bracket is None else bracket.good,
         large_signal_lower_limit=None if lower is None else lower.good,
-        refuted_limit=refuted, missed_deadlines_from=_missed_from(varied, sorted(trials.tried)),
+        refuted_limit=refuted, missed_deadlines_from=_missed_from(varied, span, scheduled),
         follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
         scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
@@ -126,11 +130,18 @@ def limit(
     )  # fmt: skip
 
 
-def _missed_from(varied: Varied, values: Sequence[float]) -> float | None:
-    """The lowest of some rising values at which the schedule of a system misses deadlines."""
-    if not (varied.system.computers or varied.system.networks):
-        return None
-    return next((value for value in values if schedule(varied.at(value)).misses_deadlines), None)
+def _missed_from(varied: Varied, span: Range, values: Sequence[float]) -> float | None:
+    """The lowest value, of some rising ones and to the tolerance, at which the schedule misses deadlines."""
+    bracket = first_failure(lambda value: schedule(varied.at(value)).misses_deadlines, values, span.tolerance)
+    return None if bracket is None else bracket.bad
+
+
+def _starved(varied: Varied, span: Range, values: Sequence[float]) -> list[str]:
+    """The note on the lowest of some rising values at which a task or message is never done."""
+    for value in values:
+        if names := schedule(varied.at(value)).starved:
+            return [f"at {span.text(value)} {some(names)} is never done: small deviations are of the loop without it"]
+    return []
 
 
 def _checked(request: Request, of: str, confidence: float) -> tuple[Varied, Files]:
@@ -250,11 +261,12 @@ def _note(
     measured = None if bracket is None else bracket.good
     if measured is None:
         return [*parts, f"the local limit is {span.text(local)}"]
+    slowly = f"a run of {quantity(trials.varied.system.stop_time, 's')} does not show slow growth"
     if measured > (1.0 + GAP) * local:
         return [
             *parts,
             f"more than a tenth beyond the local limit of {span.text(local)}, from which on small motions grow: it "
-            "may oscillate, and what is judged is good still",
+            f"may oscillate, and what is judged is good still; {slowly}",
         ]
     if measured < (1.0 - GAP) * local:
         return [
@@ -262,4 +274,5 @@ def _note(
             f"more than a tenth below the local limit of {span.text(local)}: what is judged fails earlier, by large "
             "signals or as small ones decay too slowly for the horizon, which a longer --stop-time tells",
         ]
-    return [*parts, f"within a tenth of the local limit of {span.text(local)}"]
+    beyond = f", from which on small motions grow: {slowly}" if measured > local + span.tolerance else ""
+    return [*parts, f"within a tenth of the local limit of {span.text(local)}{beyond}"]

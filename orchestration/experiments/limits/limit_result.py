@@ -65,7 +65,7 @@ class Limit:
     """The lowest evaluated value of a random quantity at which so many seeds fail that `RELIABILITY` is refuted at the
     confidence; None: nothing is random, or there is none in the range."""
     missed_deadlines_from: float | None = None
-    """The lowest evaluated value at which tasks or messages miss deadlines; None: none do."""
+    """The lowest value, to the tolerance, at which tasks or messages miss deadlines; None: at no evaluated one."""
     follows: str = ""
     """The references and the components that follow them; empty if there are none."""
     horizon: float

@@ -40,6 +40,8 @@ class Range:
     own: float | None = None
     """the value that the system itself has, from which the search goes up and down; None: it goes up from the first"""
     before: tuple[float, ...] = ()
+    also: tuple[float, ...] = ()
+    """further values, as those at which runs fail, near which small deviations may grow"""
     first: float
     step: float
     last: float
@@ -56,7 +58,7 @@ class Range:
         steps = [float(f"{self.first + i * self.step:.12g}") for i in range(count + 1)]
         if self.last - steps[-1] > self.tolerance:  # the last step is shorter
             steps.append(self.last)
-        values = [*(value for value in self.before if value < self.first), *steps]
+        values = sorted({*(value for value in self.before if value < self.first), *steps, *self.also})
         if self.own is None:
             return values
         return sorted([self.own, *(value for value in values if not math.isclose(value, self.own))])

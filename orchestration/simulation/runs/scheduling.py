@@ -50,6 +50,12 @@ class Scheduled:
         return any(one.missed for one in (*self.tasks.values(), *self.messages.values()))
 
     @property
+    def starved(self) -> list[str]:
+        """The tasks and messages that are released, and none of which is ever done."""
+        each = {**self.tasks, **self.messages}
+        return [name for name, one in each.items() if one.jobs and one.response is None]
+
+    @property
     def verdict(self) -> str:
         """Which deadlines are missed, or how near the worst response comes to one, and what is busiest."""
         each = {**self.tasks, **self.messages}

@@ -1,12 +1,12 @@
 """Local limits: where small deviations from an operating point cease to decay."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, partial
-from itertools import groupby
+from functools import cache
+from itertools import groupby, takewhile
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good
@@ -125,16 +125,23 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
     Rounding grows and decays as rounding does, whatever the limit: two pulses of about one size have to agree, too.
     """
     with closing(Instances()) as instances:
-        known = _known_at_own(at, span, instances)
-        found = _first_growth(partial(_rate, at, instances, known, 1.0), span, TWINS, TWINS_TOLERANCE)
+        known, growths = _known_at_own(at, span, instances), dict[float, float]()
+
+        def growth(value: float) -> float:
+            if value not in growths:
+                growths[value] = _rate(at, instances, known, 1.0, value)
+            return growths[value]
+
+        found = _first_growth(growth, span, TWINS, TWINS_TOLERANCE)
         if found.limit is None:
             return found
-        near = _near(found.limit, span)
-        first, alike = ([_rate(at, instances, known, size, value) for value in near] for size in (1.0, DITHERED))
+        near = _beside(found.limit, growth, growths, span, (False, True))
+        first, alike = [growth(value) for value in near], [_rate(at, instances, known, DITHERED, v) for v in near]
         if max(abs(a - b) for a, b in zip(first, alike)) <= AGREE * abs(first[1] - first[0]) and all(
-            [_rate(at, instances, known, OTHER_SIZE, value) > 0.0 for value in _near(end, span)] == grows
-            for end, grows in ((found.limit, [False, True]), (found.lower, [True, False]))
+            (_rate(at, instances, known, OTHER_SIZE, value) > 0.0) == grows
+            for end, both in ((found.limit, (False, True)), (found.lower, (True, False)))
             if end is not None
+            for value, grows in zip(_beside(end, growth, growths, span, both), both)
         ):
             return replace(found, limit=_as_accurate(found.limit, found), lower=_as_accurate(found.lower, found))
     return LinearLimit(
@@ -148,8 +155,22 @@ def _as_accurate(end: float | None, found: LinearLimit) -> float | None:
     return end if end is None or not found.accuracy else round(end, -math.floor(math.log10(found.accuracy)))
 
 
-def _near(end: float, span: Range) -> tuple[float, float]:
-    return max(min(span.values()), (1.0 - NEAR) * end), min(span.last, (1.0 + NEAR) * end)
+def _beside(
+    end: float, growth: Growth, growths: Mapping[float, float], span: Range, grows: tuple[bool, bool]
+) -> tuple[float, float]:
+    """A value below an end and one above it, `NEAR` it; nearer where the loop is another one there.
+
+    As that of a computer which has no time left for one of its tasks.
+    """
+    low, high = max(min(span.values()), (1.0 - NEAR) * end), min(span.last, (1.0 + NEAR) * end)
+
+    def like(far: float, grows: bool) -> float:
+        if (growth(far) > 0.0) == grows:
+            return far
+        between = sorted((v for v in growths if min(end, far) < v < max(end, far)), key=lambda v: abs(v - end))
+        return max(takewhile(lambda v: (growths[v] > 0.0) == grows, between), key=lambda v: abs(v - end), default=far)
+
+    return like(low, grows[0]), like(high, grows[1])
 
 
 def _rate(
@@ -270,7 +291,7 @@ def _first_growth(growth: Growth, span: Range, method: str, finer: float | None)
     reason = ""
     if ends.upper is None:
         start, end = span.text(values[0] if lower is None else lower), span.text(values[-1])
-        reason = f"small deviations decay from {start} to {end}, where the scan ends"
+        reason = f"small deviations decay at each value tried from {start} to {end}, where the scan ends"
     elif upper is None:
         reason = f"small deviations grow at {span.text(values[0])}, where the scan begins"
     return LinearLimit(

@@ -545,8 +545,28 @@ def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
     tasks = {name: {"period": 0.004, "priority": i, "execution": 0.002} for i, name in enumerate(("fast", "load"))}
     system = system_from_tables({"stop_time": 0.1, "computers": {"cpu": {"tasks": tasks}}}, Path())
     varied = Varied(request=system, of="computers.cpu.tasks.load.execution")
-    assert limits._missed_from(varied, [0.001, 0.002]) is None  # 100 % busy, and in time
-    assert limits._missed_from(varied, [0.001, 0.0025, 0.003]) == 0.0025
+    span = Range(first=0.001, step=0.0015, last=0.004, tolerance=1e-5)
+    assert limits._missed_from(varied, span, [0.001, 0.002]) is None  # 100 % busy, and in time
+    assert limits._missed_from(varied, span, [0.001, 0.0025, 0.003]) == pytest.approx(0.002 + 0.5e-5, abs=0.5e-5)
+    varied = Varied(request=system, of="computers.cpu.tasks.fast.execution")
+    assert limits._starved(varied, span, [0.001, 0.0025]) == []  # late, and done
+    assert limits._starved(varied, span, [0.0025, 0.004, 0.005]) == [
+        "at 4 ms cpu.load is never done: small deviations are of the loop without it"
+    ]
+
+
+def test_linear_theory_tries_the_values_at_which_runs_fail(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def theory(varied: Varied, span: Range) -> LinearLimit:
+        return LinearLimit(limit=span.values()[span.values().index(0.035) - 1])
+
+    monkeypatch.setattr(limits, "local_limits", theory)
+    assert 0.0317 < (limits.limit(scenario_of(), "period", first=0.03, scan=0.005).local_limit or 0.0) < 0.035
+    monkeypatch.setattr(limits, "local_limits", lambda varied, span: LinearLimit(limit=0.031))
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.0334 else 1.0)
+    note = limits.limit(scenario_of(), "period", first=0.03, scan=0.005).note
+    assert note.endswith("31 ms, from which on small motions grow: a run of 30 s does not show slow growth")
 
 
 def test_a_range_without_failures_or_without_good_values_is_noted(

@@ -43,7 +43,7 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     )
     monkeypatch.setattr(local_limit, "growth_of_loop", growth)
     below = local_limit.about_rest(at, replace(SPAN, last=0.48, own=0.4))
-    assert below.reason == "small deviations decay from 310 ms to 480 ms, where the scan ends"
+    assert below.reason == "small deviations decay at each value tried from 310 ms to 480 ms, where the scan ends"
 
 
 @pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, None), (1e9, None)])
@@ -63,6 +63,22 @@ def test_a_pulse_that_rounding_blurs_is_not_believed(
     found = local_limit.about_rest(at, SPAN)
     assert found.limit == (limit if limit is None else pytest.approx(limit, abs=1e-2))
     assert ("depends on how small they are" in found.reason) == (limit is None)
+
+
+def test_growth_is_confirmed_on_the_side_of_a_limit_where_the_loop_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond 0.52 a task has no time left, and what is left of the loop is stable."""
+
+    def growth(system: Any, *others: Any) -> Growth:
+        return Growth(rate=-1.0 if system.stop_time > 0.52 else system.stop_time - 0.5, horizon=1.0)
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise UsageError("no saved states")
+
+    monkeypatch.setattr(local_limit, "growth_of", growth)
+    monkeypatch.setattr(local_limit, "growth_of_loop", refuse)
+    assert "decay at each value tried" in local_limit.about_rest(at, replace(SPAN, first=0.075)).reason
+    found = local_limit.about_rest(at, replace(SPAN, first=0.075, also=(0.51,)))
+    assert found.limit == pytest.approx(0.5, abs=2e-3)
 
 
 def test_a_period_among_several_rates_has_no_limit_beyond_a_value_that_is_unstable(
