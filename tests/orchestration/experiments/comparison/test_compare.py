@@ -305,7 +305,7 @@ def test_a_comparison_is_printed_as_a_table(
     cells = pd.read_csv(StringIO("\n".join(lines))).set_index(["loss", "period", "controller"])
     has = cells["survives.difference"].notna()
     assert has.tolist() == cells.index.isin(["uncoupled"], level="controller").tolist()
-    one, other = (cells.loc[(0.3, 0.05, law)] for law in ("uncoupled", "coupled"))
+    one, other = (cells.loc[(0.3, 0.02, law)] for law in ("uncoupled", "coupled"))
     assert one["settles.difference"] == one["settles.share"] - other["settles.share"]
     assert one["settles.difference.low"] <= one["settles.difference"] <= one["settles.difference.high"]
 
