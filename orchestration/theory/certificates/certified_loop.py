@@ -10,7 +10,7 @@ from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.processes.passable import passable
 from orchestration.systems.system.connection import Connection, variable_of
 from orchestration.systems.system.model import System
-from orchestration.theory.stability.lifted_component import of_one_rate
+from orchestration.theory.stability.lifted_component import of_one_rate, several_rates
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
     Components,
@@ -56,6 +56,9 @@ def certified_loop(rest: AtRest) -> CertifiedLoop:
             raise UsageError(f"connections.{x.name}.hold: expected zero")
         if system.components[x.sender].sampling is None and system.components[x.receiver].sampling is None:
             raise UsageError(f"connections.{x.name}: expected a sampled component at one of its ends")
+    for name, component in system.components.items():
+        if component.sampling is not None and (count := rest.samples(name)) > 1:
+            raise several_rates(name, count)  # before any is measured, which takes long
     period = float(rest.period) / NANOSECONDS
     components: Components = {}
     for name, component in system.components.items():

@@ -183,7 +183,9 @@ class Branching:
                 branches = [
                     each if lost else self._deliver_now(each, i) for b in branches for lost, each in self._losses(b, i)
                 ]
-        branches = [replace(b, piece=self._effects.sample(b.piece, task)) for b in branches]
+        branches = [
+            replace(b, piece=self._effects.sample(b.piece, task, self.tasks[task].numbers[place])) for b in branches
+        ]
         for i, link in enumerate(self.links):
             if link.sender == task:
                 branches = [

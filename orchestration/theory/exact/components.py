@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.in_double import are_in_double, of_code
-from orchestration.theory.stability.lifted_component import of_one_rate, several_rates
+from orchestration.theory.stability.lifted_component import LiftedTangent
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
@@ -20,7 +20,7 @@ from orchestration.theory.stability.matrices import (
     SampledSystem,
     depends_on_step,
     in_continuous_time,
-    of_samples,
+    turns_of,
     whole_nanoseconds,
 )
 
@@ -46,7 +46,7 @@ class IdentifiedComponent:
     """Accuracy of each sample, whose errors add up, of a component whose coordinates are nearly dependent; 0 of
     others"""
     tangent: Tangent
-    """whose coordinates its state has"""
+    """whose coordinates its state has, of several rates that before all samples"""
 
 
 class ComponentIdentifier:
@@ -56,16 +56,16 @@ class ComponentIdentifier:
         self._known: dict[tuple[object, ...], IdentifiedComponent] = {}
 
     def of(self, loop: AtRest) -> dict[str, IdentifiedComponent]:
-        """The components of a loop."""
-        found, components = {}, loop.simulation.system.components
+        """The components of a loop, sampled ones from the first sample of a run on."""
+        found = {}
         keys = {name: _cache_key(loop, name) for name in loop.simulation.instances}
-        for name, key in keys.items():
-            if key not in self._known and components[name].sampling is not None and (count := loop.samples(name)) > 1:
-                raise several_rates(name, count)  # before any is identified, which takes long
         for name, key in keys.items():
             if key not in self._known:
                 self._known[key] = _identified(loop, name)
-            found[name] = self._known[key]
+            known = self._known[key]
+            if isinstance(known.part, SampledSystem):
+                known = replace(known, part=known.part.turned(-loop.taken(name)))
+            found[name] = known
         return found
 
 
@@ -87,11 +87,12 @@ def _cache_key(loop: AtRest, name: str) -> tuple[object, ...]:
 
 def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
-    tangent = of_one_rate(loop.tangent(name))
+    found = loop.tangent(name)
+    tangent = found.whole if isinstance(found, LiftedTangent) else found
     is_linear, precision = tangent.accuracy <= SAME, 0.0
     part: Continuous | SampledSystem
     if component.sampling is not None:
-        part = SampledSystem(**vars(of_samples(tangent, step)), depends_on_step=depends_on_step(tangent, step))
+        part = _sampled(found, step)
     else:
         allowed = INEXACT
         if is_linear and tangent.rounding <= DIFFERS:
@@ -105,6 +106,13 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     method += of_code(are_in_double({name: component}))
     accuracy = max(ROUNDING, tangent.accuracy)
     return IdentifiedComponent(part=part, method=method, accuracy=accuracy, precision=precision, tangent=tangent)
+
+
+def _sampled(tangent: Tangent | LiftedTangent, period: float) -> SampledSystem:
+    """A sampled component from its rest on."""
+    turns, whole = turns_of(tangent, period), tangent.whole if isinstance(tangent, LiftedTangent) else tangent
+    first, *later = turns
+    return SampledSystem(**vars(first), later=tuple(later), depends_on_step=depends_on_step(whole, len(turns) * period))
 
 
 def _informative_step(loop: AtRest, name: str) -> float:

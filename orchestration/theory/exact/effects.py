@@ -245,10 +245,11 @@ class LoopEffects(ABC):
             change[last] = message
         return piece.mapped(np.delete(change, leaves, axis=0))
 
-    def sample(self, piece: Piece, task: int) -> Piece:
-        """A task samples."""
+    def sample(self, piece: Piece, task: int, number: int) -> Piece:
+        """A task takes a sample of a number."""
         name = self.tasks[task]
-        part = self.sampled_parts[name]
+        turns = self.sampled_parts[name].turns
+        part = turns[number % len(turns)]
         size = len(piece.Z)
         state, output = self.places("state", name), self.places("output", name)
         inputs = self.input_rows(name)

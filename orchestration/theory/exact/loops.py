@@ -29,9 +29,9 @@ from orchestration.theory.exact.initial_state import InitialState, initial_state
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
-from orchestration.theory.exact.timing import links_of, sampled_tasks
+from orchestration.theory.exact.timing import by_turns, links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain, costs_until
-from orchestration.theory.stability.loop_at_rest import ExtraSignals, at_rest
+from orchestration.theory.stability.loop_at_rest import ExtraSignals, whole_at_rest
 from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
 from orchestration.theory.stability.periodic_schedule import periodic_schedule
 from orchestration.theory.stability.scheduled import without_scheduler
@@ -123,11 +123,17 @@ class Loops:
         objectives, initial_state = ObjectiveMeans(system, models), None
         stepped = [] if initial is None else [end for name in steps_of(initial) for end in initial.sources[name].to]
         extra = ExtraSignals(inputs=(*noise, *stepped), outputs=objectives.outputs)
-        with at_rest(system, self._instances, extra=extra, models=models) as loop:
+        with whole_at_rest(system, self._instances, extra=extra, models=models) as loop:
             objectives.expand_about(loop)
             known = self._identifier.of(loop)
             parts = {name: one.part for name, one in known.items()}
             if initial is not None:
+                for name, one in known.items():
+                    if isinstance(one.part, SampledSystem) and one.part.later:
+                        raise UsageError(
+                            f"horizon: the initial state of {name}, code of several rates, is not identified: expected "
+                            "none, for stationary means, or an average over runs (quadcosim sweep)"
+                        )
                 tangents = {name: one.tangent for name, one in known.items()}
                 means = objectives.means.values()
                 initial_state = initial_state_of(initial, loop, parts, tangents, means, self._instances)
@@ -251,6 +257,8 @@ class Loops:
         steps = [link.step for link in links_of(system) if link.step is not None]
         schedule = periodic_schedule(system, horizon=horizon, other_periods=[*unscheduled, *steps, *effects.grids])
         tasks, links = sampled_tasks(system, schedule), links_of(system, schedule)
+        turns = {name: len(part.turns) for name, part in linear.parts.items() if isinstance(part, SampledSystem)}
+        tasks, links = by_turns(tasks, links, turns)
         expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
         if self.simulated:
             expect_rows(system, tasks, links)

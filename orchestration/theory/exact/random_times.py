@@ -177,6 +177,9 @@ class SampledTask:
     period: Fraction
     offsets: tuple[Fraction, ...] = (Fraction(0),)
     """Offsets in ascending order"""
+    numbers: tuple[int, ...] = (0,)
+    """Numbers of the samples at these offsets in a period that begins at a multiple of it, up to one for all periods;
+    those of the samples of a component of several rates count whose turn it is"""
     jitter: RandomTime = CERTAIN
 
 

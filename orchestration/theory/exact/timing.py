@@ -1,5 +1,7 @@
 """The tasks and links of a system, with the randomness of its timing."""
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError
@@ -34,7 +36,8 @@ def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> l
         sampling = system.components[name].sampling
         assert sampling is not None
         if name in schedule.samples:
-            found.append(SampledTask(name=name, period=schedule.period, offsets=schedule.samples[name]))
+            offsets, numbers = schedule.samples[name], schedule.numbers[name]
+            found.append(SampledTask(name=name, period=schedule.period, offsets=offsets, numbers=numbers))
             continue
         if sampling.clock == "fmu":
             raise UsageError(f"components.{name}.sampling.clock: fmu: expected the master's")
@@ -46,6 +49,24 @@ def sampled_tasks(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> l
             )
         )  # fmt: skip
     return found
+
+
+def by_turns(
+    tasks: Sequence[SampledTask], links: Sequence[RandomLink], turns: Mapping[str, int]
+) -> tuple[list[SampledTask], list[RandomLink]]:
+    """Tasks and links, with as many periods of a task in one as there are until its samples have their turns again."""
+    longer, late = list(tasks), list(links)
+    for i, task in enumerate(tasks):
+        count, rates = len(task.offsets), turns.get(task.name, 1)
+        periods = rates // math.gcd(rates, count)
+        if periods > 1:
+            longer[i] = replace(
+                task, period=periods * task.period,
+                offsets=tuple(offset + k * task.period for k in range(periods) for offset in task.offsets),
+                numbers=tuple(number + k * count for k in range(periods) for number in task.numbers),
+            )  # fmt: skip
+            late = [replace(x, transit_times=periods * x.transit_times) if x.sender == i else x for x in late]
+    return longer, late
 
 
 def links_of(system: System, schedule: PeriodicSchedule = NO_SCHEDULE) -> list[RandomLink]:

@@ -36,6 +36,8 @@ FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
 """Difference of the responses to a pulse on all inputs at two samples, up to which they are alike"""
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+"""the least rational share of all"""
 MOST_SAMPLES = 20
 """Samples after which the response of a component of several rates repeats, at most"""
 FEWEST_LIFTED = 8
@@ -176,7 +178,8 @@ def _samples_until_alike(excitation: Excitation, sample: Rung) -> int:
     Raises `UsageError` where it does not repeat within `MOST_SAMPLES`.
     """
     later, rest, responses = [sample] * MOST_SAMPLES, excitation.rest, list[Floats]()
-    pulsed = excitation.held + excitation.pulses
+    shares = 1.0 / (1.0 + (GOLDEN * np.arange(len(excitation.held))) % 1.0)  # no two inputs cancel, as their difference
+    pulsed = excitation.held + shares * excitation.pulses
     for _ in range(2 * MOST_SAMPLES):
         outputs, perturbed = excitation.stepped(rest, sample, pulsed)
         unperturbed, rest = excitation.followed(rest, sample)

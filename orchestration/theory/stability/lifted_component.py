@@ -87,7 +87,7 @@ def several_rates(name: str, samples: int) -> UsageError:
     """That a component responds alike only every some samples, where one rate is needed."""
     return UsageError(
         f"{name}: responds alike only at every {_nth(samples)} sample, as code of several rates does: expected an FMU, "
-        "and a component, for each rate, or limit, linearise, bode, step or locus, which take several"
+        "and a component, for each rate, or limit, linearise, bode, step, locus or expect, which take several"
     )
 
 

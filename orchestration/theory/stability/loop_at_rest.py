@@ -77,8 +77,9 @@ class Start:
     """Where a system has come to rest: there others begin that differ from it in timing."""
 
     components: Mapping[str, Component]
-    saved: Mapping[str, tuple[bytes, float]]
-    """Saved states of components, and the times of their next steps by their own clocks [s]; others begin anew"""
+    saved: Mapping[str, tuple[bytes, float, int]]
+    """Saved states of components, the times of their next steps by their own clocks [s], and the steps taken; others
+    begin anew"""
     held: Mapping[str, Mapping[str, float]]
     """The inputs of the components there"""
     ticking: frozenset[str]
@@ -94,7 +95,7 @@ class Start:
         instances = cast("Mapping[str, TracedInstance]", simulation.instances)
         return cls(
             components=simulation.system.components,
-            saved={name: (state, instances[name].time) for name, state in saved.items()},
+            saved={name: (state, instances[name].time, instances[name].taken) for name, state in saved.items()},
             held=written_in(simulation),
             ticking=frozenset(name for name, one in instances.items() if one.model.ticking),
             tunable=frozenset(
@@ -183,6 +184,10 @@ class AtRest:
         found = self._begun(name)
         return samples_of(found)
 
+    def taken(self, name: str) -> int:
+        """How many steps a component has taken before it was at rest."""
+        return cast("TracedInstance", self.simulation.instances[name]).taken
+
     def _begun(self, name: str) -> AnyTangent | SampledRest:
         if name not in self.begun:
             with stated_beside_bar(f"linear model of {name}"):
@@ -255,6 +260,7 @@ def at_rest(
 def whole_at_rest(
     system: System,
     instances: Instances,
+    extra: ExtraSignals = NO_SIGNALS,
     models: Mapping[str, Model] | None = None,
     known: KnownTangents | None = None,
 ) -> Iterator[AtRest]:
@@ -265,13 +271,13 @@ def whole_at_rest(
     calm, known = in_fixed_periods(system), KnownTangents() if known is None else known
     seen = {name: samples_of(one) for name, (_, _, one) in known.items() if name in calm.components}
     period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
-    with _settled(calm, period, instances, NO_SIGNALS, models, known) as loop:
+    with _settled(calm, period, instances, extra, models, known) as loop:
         sampled = [name for name, one in calm.components.items() if one.sampling is not None]
         whole = hyperperiod([period, *_cycles(calm, {name: loop.samples(name) for name in sampled})])
         if whole == period:
             yield loop
             return
-    with _settled(calm, whole, instances, NO_SIGNALS, models, known) as loop:
+    with _settled(calm, whole, instances, extra, models, known) as loop:
         yield loop
 
 
@@ -338,7 +344,7 @@ def _corrected(calm: System, period: Fraction, instances: Instances, known: Know
         balance(components, calm.connections)
     return replace(
         near,
-        saved={one.name: (one.state.saved, one.state.time) for one in components},
+        saved={one.name: (one.state.saved, one.state.time, ones[one.name].taken) for one in components},
         held={one.name: {**near.held[one.name], **dict(zip(one.inputs, one.held.tolist()))} for one in components},
         tuned={},
     )
@@ -505,11 +511,15 @@ class TracedInstance:
     """
 
     def __init__(
-        self, fmu: Instance, begins: tuple[bytes, float] | None = None, tuned: Mapping[str, Parameter] | None = None
+        self,
+        fmu: Instance,
+        begins: tuple[bytes, float, int] | None = None,
+        tuned: Mapping[str, Parameter] | None = None,
     ) -> None:
         self.fmu, self._tuned = fmu, tuned or {}
         self.written: dict[str, float] = {}
         self.time = self.later = 0.0
+        self.taken = 0
         self._begins = begins
 
     def __getattr__(self, name: str) -> Any:
@@ -542,7 +552,7 @@ class TracedInstance:
     def begin(self, held: Mapping[str, float]) -> None:
         """Take the state in which it begins, with some inputs."""
         if self._begins is not None:
-            saved, self.time = self._begins
+            saved, self.time, self.taken = self._begins
             self.fmu.restore(saved)
             for name, value in self._tuned.items():
                 self.fmu.set(name, value)
@@ -558,6 +568,7 @@ class TracedInstance:
         t += self.later
         self.fmu.step(t, h)
         self.time = t + h
+        self.taken += 1
 
 
 def tracing_loader(instances: Instances, start: Start | None = None) -> Loader:

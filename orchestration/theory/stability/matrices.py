@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
 import numpy as np
@@ -22,6 +22,8 @@ INEXACT = 1e-7
 continuous time"""
 NO_FEEDTHROUGH = 1e-6
 """Share of the largest response of an output to an input in a step: smaller feedthrough is taken for rounding"""
+NEGLIGIBLE = 1e-12
+"""Share of the state between samples of several rates that counts as rounding"""
 TERMS = 24
 INDEPENDENT = (0.1, 1e-3, 1e-5, 1e-8)
 """relative part of a coordinate outside of the span of those before it, at least; tried in turn"""
@@ -61,8 +63,20 @@ class Continuous(Matrices):
 class SampledSystem(Matrices):
     """A sampled component: at each sample y = C x + D u, and then x becomes A x + B u."""
 
+    later: tuple[Matrices, ...] = ()
+    """Matrices of the samples that follow, of a component of several rates; then they repeat"""
     depends_on_step: bool = False
     """whether a sample depends on the time to the next one"""
+
+    @property
+    def turns(self) -> tuple[Matrices, ...]:
+        """The matrices of its samples, in turn."""
+        return Matrices(**{each.name: getattr(self, each.name) for each in fields(Matrices)}), *self.later
+
+    def turned(self, by: int) -> SampledSystem:
+        """The same, begun some samples later, or earlier."""
+        first, *later = (self.turns[(k + by) % len(self.turns)] for k in range(len(self.turns)))
+        return SampledSystem(**vars(first), later=tuple(later), depends_on_step=self.depends_on_step)
 
 
 M = TypeVar("M", bound=Matrices)
@@ -99,6 +113,41 @@ def of_lifted(tangent: Tangent | LiftedTangent, period: float, samples: int) -> 
         B=np.hstack([powers[steps - 1 - k] @ one.B for k in range(steps)]),
         C=np.vstack([one.C @ powers[k] for k in range(steps)]), D=D,
     )  # fmt: skip
+
+
+def turns_of(tangent: Tangent | LiftedTangent, period: float) -> list[Matrices]:
+    """The matrices of a component sampled every `period` [s], at each sample until it responds as before.
+
+    Between two samples the state is what the outputs and the state to come depend on, of the state before all of them
+    and the inputs since; it is filled up with zeros to one size.
+    """
+    samples = 1 if isinstance(tangent, Tangent) else tangent.samples
+    whole = of_lifted(tangent, period, samples)
+    n, p, m = len(whole.A), len(whole.C) // samples, whole.D.shape[1] // samples
+    onto, back = [np.eye(n)], [np.eye(n)]
+    for k in range(1, samples):
+        ahead = np.block([[whole.C[k * p :], whole.D[k * p :, : k * m]], [whole.A, whole.B[:, : k * m]]])
+        columns = np.linalg.norm(ahead, axis=0)
+        columns[columns == 0.0] = 1.0
+        rows = np.linalg.norm(ahead / columns, axis=1, keepdims=True)
+        rows[rows == 0.0] = 1.0
+        _, values, right = np.linalg.svd(ahead / columns / rows, full_matrices=False)
+        right = right[values > NEGLIGIBLE * values.max(initial=0.0)]
+        onto.append(right * columns)
+        back.append(right.T / columns[:, None])
+    size = max(map(len, onto))
+    found = []
+    for k in range(samples):
+        row, given = slice(k * p, (k + 1) * p), slice(k * m, (k + 1) * m)
+        y = np.hstack([whole.C[row], whole.D[row, : k * m]]) @ back[k], whole.D[row, given]
+        if k + 1 < samples:
+            then = onto[k + 1][:, : n + k * m] @ back[k], onto[k + 1][:, n + k * m :]
+        else:
+            then = np.hstack([whole.A, whole.B[:, : k * m]]) @ back[k], whole.B[:, given]
+        A, B, C = np.zeros((size, size)), np.zeros((size, m)), np.zeros((p, size))
+        A[: len(then[0]), : then[0].shape[1]], B[: len(then[1])], C[:, : y[0].shape[1]] = *then, y[0]
+        found.append(Matrices(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=y[1]))
+    return found
 
 
 def in_continuous_time(

@@ -37,6 +37,8 @@ class PeriodicSchedule:
     """Period [s]"""
     samples: Mapping[str, tuple[Fraction, ...]]
     """Times of the samples in a period [s], by component"""
+    numbers: Mapping[str, tuple[int, ...]]
+    """Numbers of these samples, had all periods from the begin of a run on as many"""
     sent: Mapping[str, tuple[Fraction, ...]]
     """Times at which messages are sent [s], by connection from continuous time over a network"""
     transit_times: Mapping[str, tuple[int | None, ...]]
@@ -45,7 +47,9 @@ class PeriodicSchedule:
     """connections whose own delays and losses `transit_times` include"""
 
 
-NO_SCHEDULE = PeriodicSchedule(period=Fraction(1), samples={}, sent={}, transit_times={}, with_own_delay=frozenset())
+NO_SCHEDULE = PeriodicSchedule(
+    period=Fraction(1), samples={}, numbers={}, sent={}, transit_times={}, with_own_delay=frozenset()
+)  # fmt: skip
 """Schedule of a system without computers and networks"""
 
 
@@ -77,8 +81,12 @@ class ScheduleTrace:
         """
         parts, until = self.resources.parts, end == self.stop
         samples, sent, transit_times = dict[str, tuple[Fraction, ...]](), dict[str, tuple[Fraction, ...]](), {}
+        numbers = dict[str, tuple[int, ...]]()
         for name, task in self.resources.tasks.items():
-            samples[name] = _offsets_between(self.notes_of(note.SAMPLED, task)[:, 4], begin, end, period)[0]
+            times = self.notes_of(note.SAMPLED, task)[:, 4]
+            samples[name], which = _offsets_between(times, begin, end, period)
+            windows = [Fraction(time, NANOSECONDS) // period for time in times[which].tolist()]
+            numbers[name] = tuple(k - window * len(which) for k, window in zip(which.tolist(), windows))
         released = frozenset(name for name, c in self.resources.carriers.items() if parts.carriers[c].releases)
         for name, c in self.resources.carriers.items():
             sender = parts.carriers[c].sender
@@ -95,7 +103,8 @@ class ScheduleTrace:
             if sender == NONE:
                 sent[name] = offsets
         return PeriodicSchedule(
-            period=period, samples=samples, sent=sent, transit_times=transit_times, with_own_delay=released
+            period=period, samples=samples, numbers=numbers, sent=sent, transit_times=transit_times,
+            with_own_delay=released,
         )  # fmt: skip
 
 

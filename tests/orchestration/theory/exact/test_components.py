@@ -21,12 +21,11 @@ def decaying(h: float) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("rounding", [0.0, 1e-7])
 def test_a_step_differs_from_two_of_half_its_length_by_as_much_as_coordinates_round(
-    rounding: float, monkeypatch: pytest.MonkeyPatch
+    rounding: float,
 ) -> None:
     tangent = SimpleNamespace(
         inputs=("u",), outputs=("y",), unit=0.01, accuracy=0.0, rounding=rounding, derivatives=decaying
     )
-    monkeypatch.setattr(components, "of_one_rate", lambda one: one)
     fixed = SimpleNamespace(model=SimpleNamespace(varies_step=False))
     plant = SimpleNamespace(sampling=None, step=0.01, fmu="plant.fmu")
     simulation = SimpleNamespace(system=SimpleNamespace(components={"plant": plant}), instances={"plant": fixed})
