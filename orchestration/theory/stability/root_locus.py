@@ -92,22 +92,27 @@ class RootLocus:
     crossings: tuple[Crossing, ...]
     """Values at which poles cross the unit circle, in rising order."""
     curve: Floats = field(repr=False)
-    """All values that were tried, also beside jumps, and the spectral radius at each, shape (2, k)."""
+    """All values that were tried, also beside jumps, and the spectral radius at each, shape (2, k); NaN: no poles."""
     in_double: tuple[str, ...] = ()
     """The components whose float code in C is taken in double precision."""
+    without: tuple[str, ...] = ()
+    """The values asked for that have no poles, in rising order, and why each: where the loop has no rest, say."""
 
     def __repr__(self) -> str:
         return f"<RootLocus: {self.verdict}>"
 
     @property
     def verdict(self) -> str:
-        """Where poles leave the unit circle and return, or that they do not."""
+        """Where poles leave the unit circle and return, or that they do not; and where there are none, and why."""
 
         def shown(value: float) -> str:
             return quantity(value, self.unit, DIGITS)
 
         first, last = shown(self.values[0]), shown(self.values[-1])
         known = f"(small deviations{of_code(self.in_double)})"
+        if self.without:
+            count = len(self.values) + len(self.without)
+            known += f"; no poles at {len(self.without)} of {count} values, as {self.without[0]}"
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
@@ -152,7 +157,7 @@ def locus(
     jumps of a delay to a sampled component: both sides of each are tried. A period beside others crosses between two at
     which all coincide.
 
-    Raises `UsageError` for an invalid quantity or range, and as `linearise`.
+    Raises `UsageError` for an invalid quantity or range, and as `linearise` where neither end of the range has poles.
     """
     if not 2 <= count <= MAX_COUNT:
         raise UsageError(f"--count {count}: expected a number from 2 to {MAX_COUNT}")
@@ -199,27 +204,40 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 raise UsageError(f"{varied.of} = {value:g}: {error}") from None
             return radius_of(value)
 
+        without = dict[float, str]()
+
+        def radius_if_any(value: float) -> float | None:
+            try:
+                return radius(value)
+            except UsageError as error:
+                without[value] = str(error)
+                return None
+
         shortened, tried = _shortening(beside, unit), _beside_jumps(varied, system, values)
         crossings = list[Crossing]()
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
-            high = radius(tried[-1])
+            high = radius_if_any(tried[-1])
+            if high is None and radius_if_any(tried[0]) is None:
+                raise UsageError(without[tried[-1]])
             for place in range(len(tried) - 2, -1, -1):
-                above, high = high, radius(tried[place])
+                above, high = high, radius_if_any(tried[place])
                 report(1.0 - place / len(tried))
-                if (high < 1.0) != (above < 1.0):
+                if above is not None and high is not None and (high < 1.0) != (above < 1.0):
                     ends = ((tried[place], high - 1.0), (tried[place + 1], above - 1.0))
                     inside, outside = zero_between(lambda value: radius(value) - 1.0, shortened, *ends)
                     crossings.insert(0, _crossing(inside, outside, *found[outside], leaves=high < 1.0))
+    refused, values = [value for value in values if value in without], [value for value in values if value in found]
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
     for row, known_poles in zip(poles, each, strict=True):
         row[: len(known_poles)] = known_poles
-    curve = np.array([(value, radius_of(value)) for value in sorted(found)]).T
+    curve = np.array([(x, radius_of(x) if x in found else math.nan) for x in sorted(found.keys() | without.keys())]).T
     return RootLocus(
         of=varied.of, unit=unit, values=np.array(values), radius=np.array([radius_of(value) for value in values]),
         poles=poles, crossings=tuple(crossings), curve=curve,
         in_double=are_in_double({name: one for name, (one, _, _) in known.items()}),
+        without=tuple(without[value] for value in refused),
     )  # fmt: skip
 
 

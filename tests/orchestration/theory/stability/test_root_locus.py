@@ -3,12 +3,16 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from orchestration.systems.system.component import Sampling
+from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
+from orchestration.theory.stability import root_locus
+from orchestration.theory.stability.loop_at_rest import whole_at_rest
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
 from quadcosim import Timing, UsageError, bode, linearise, locus
@@ -39,6 +43,27 @@ def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_mar
     assert poles == pytest.approx(np.sort_complex(closed.poles()), abs=1e-6)
     assert found["radius"][2] == pytest.approx(loop.radius, rel=1e-9)
     assert (tmp_path / "locus.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_values_without_poles_take_nothing_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only a range without any is refused."""
+
+    def refusing(system: System, *rest: Any, **named: Any) -> Any:
+        if system.connections[-1].delay > worst:
+            raise UsageError("no rest")
+        return whole_at_rest(system, *rest, **named)
+
+    monkeypatch.setattr(root_locus, "whole_at_rest", refusing)
+    worst = 0.015
+    found = locus(example("dc_servo"), DELAY, first=0.0, last=0.028, count=3)
+    assert found.values.tolist() == [0.0, 0.014]
+    assert found.verdict == (
+        f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations); "
+        f"no poles at 1 of 3 values, as {DELAY} = 0.028: no rest"
+    )
+    worst = -1.0
+    with pytest.raises(UsageError, match=f"{DELAY} = 0.028: no rest"):
+        locus(example("dc_servo"), DELAY, first=0.0, last=0.028, count=3)
 
 
 def test_a_loop_sampled_between_whole_nanoseconds_has_the_radius_of_its_neighbour() -> None:
