@@ -75,11 +75,13 @@ def live(
 
     It has the bits of the native FMUs, whose C is compiled for WebAssembly. `vary` are ranges of numbers by path, as
     in a study (`timing.period`, `components.controller.sampling.period`); default: the timing, and parameters with a
-    declared range. `map` are the two paths of its map. `name` is the file that commands in the page run.
+    declared range. `map` are the two paths of its map. `name` is the file that commands in the page run; default:
+    that of the request.
 
     Raises `UsageError` for what a page cannot run, naming it, `QuadcosimError` without the extra `live`.
     """
     loaded = default_request() if request is None else request_of(request)
+    name = str(request) if name is None and isinstance(request, (str, Path)) else name
     with errors_in_own_terms(loaded):
         system = located(loaded.as_system())
         models = {

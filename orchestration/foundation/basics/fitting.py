@@ -42,7 +42,7 @@ def hints_of(cls: type) -> Mapping[str, Any]:
 def fitted(value: Any, hint: Any, *, from_file: bool) -> Any:
     """The value that a field with an annotation gets; raises `MisfitError`.
 
-    `from_file`: of a TOML document, where texts stand for paths, arrays for tuples, and tables for records.
+    `from_file`: of a TOML document, where texts stand for paths, and arrays for tuples; tables always are records.
     """
     kind = type(value)
     if kind is hint and kind in _SCALARS and (kind is not int or abs(value) <= _LARGEST):
@@ -81,7 +81,7 @@ def _plain(value: Any) -> Any:
 def _instance(value: Any, hint: Any, from_file: bool) -> Any:
     if not isinstance(hint, type):
         raise MisfitError
-    if from_file and type(value) is dict and hasattr(hint, "of_table"):
+    if type(value) is dict and hasattr(hint, "of_table"):
         return hint.of_table(value)
     if from_file and hint is Path:
         return Path(_if(type(value) is str, value))

@@ -229,7 +229,10 @@ def _coerced(value: Any, as_path: bool) -> Any:
 
 
 def _raise_own_error(cls: Any, kwargs: Mapping[str, Any]) -> None:
-    """Raise the record's own error, if any: it may be more exact (a probability, not a number)."""
+    """Raise the record's own error, if any, or that of a table for one: it may be more exact than a type."""
+    for name, hint in hints_of(cls).items():
+        if is_record(hint) and type(kwargs.get(name)) is dict and all(type(key) is str for key in kwargs[name]):
+            hint(**kwargs[name])
     attempt = object.__new__(cls)
     vars(attempt).update({field.name: default_of(field) for field in dataclasses.fields(cls)} | dict(kwargs))
     with contextlib.suppress(TypeError, AttributeError):

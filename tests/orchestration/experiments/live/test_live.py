@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from docs.claim_records import steps
+from orchestration.experiments.live import live as writing
 from orchestration.experiments.live.live import live
 from orchestration.foundation.basics.errors import UsageError
 from quadcosim import Scenario, fly
 from tests.extent import in_test_all, sample
 from tests.orchestration.simulation.engines.wasm.machines import Page, Wasm, hashes_of
 from tests.patience import PATIENCE
+from tests.places import ROOT
 
 ZIG = pytest.mark.skipif(
     importlib.util.find_spec("ziglang") is None, reason="no compiler for WebAssembly: pip install 'quadcosim[live]'"
@@ -253,3 +255,9 @@ def test_what_a_page_cannot_vary_is_named():
         live(Scenario(), {"timing.period": (0.1, 0.01)})
     with pytest.raises(UsageError, match=r"map timing\.delay: .*expected one of timing\.period"):
         live(Scenario(), {"timing.period": (0.01, 0.1)}, ("timing.period", "timing.delay"))
+
+
+def test_a_page_of_a_file_is_headed_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writing, "module_of", lambda *_: b"")
+    path = ROOT / "examples/dc_servo/system.toml"
+    assert f"<title>{path}</title>" in live(path).html

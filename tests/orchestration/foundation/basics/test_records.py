@@ -12,7 +12,8 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import replaced
 from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
 from orchestration.foundation.basics.typed_tables import docs_of_keys, fields_of, parsed
-from orchestration.quadrotor.scenarios.timing import TIMING_KEYS
+from orchestration.quadrotor.scenarios.scenario import Scenario
+from orchestration.quadrotor.scenarios.timing import TIMING_KEYS, Timing
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.file import ConnectionTable, SamplingTable, schema
 from orchestration.systems.system.model import System
@@ -66,8 +67,15 @@ def letters(text: str) -> str:
 def test_an_error_in_a_nested_record_names_its_place() -> None:
     with pytest.raises(UsageError, match=r"^components\.a = 3: expected a value made by Component\(…\)$"):
         System(stop_time=1.0, components={"a": 3})  # type: ignore[dict-item]
-    with pytest.raises(UsageError, match=r"^sampling = \{'period': 1.0\}: expected a value made by Sampling\(…\)$"):
-        Component(fmu="a", sampling={"period": 1.0})  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"^sampling = 1.0: expected a value made by Sampling\(…\)$"):
+        Component(fmu="a", sampling=1.0)  # type: ignore[arg-type]
+
+
+def test_a_dictionary_stands_for_a_record_and_its_errors_are_those_of_the_record() -> None:
+    assert Scenario(timing={}) == Scenario()  # type: ignore[arg-type]
+    assert Scenario(timing={"period": 0.02}) == Scenario(timing=Timing(period=0.02))  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"^timing\.perod: no such key; .*did you mean period\?$"):
+        Scenario(timing={"perod": 0.02})  # type: ignore[arg-type]
 
 
 def test_whether_a_time_is_at_least_so_many_nanoseconds_is_decided_by_decimals() -> None:
