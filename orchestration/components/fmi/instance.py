@@ -30,7 +30,7 @@ NO_STATE = (
     "cannot save its state; expected canGetAndSetFMUstate and canSerializeFMUstate in its description, an option of "
     "many tools that export FMUs"
 )
-"""What is said of an FMU whose state is to be saved, but is not"""
+"""The words about an FMU whose state is to be saved, but cannot be"""
 
 
 def convert_value(variable: Variable, value: object, place: str) -> Value:

@@ -11,7 +11,7 @@ from orchestration.foundation.processes.passable import passable
 MAX_MESSAGE_LENGTH = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
 WHOLE_NUMBER = "a whole number from -2^63 to 2^63 - 1, or a float, as 1e19"
-"""What is expected in place of a whole number of more than 64 bits with a sign"""
+"""The words for what may be in place of a longer whole number"""
 
 Value = TypeVar("Value")
 
