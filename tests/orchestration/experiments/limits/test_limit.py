@@ -509,7 +509,8 @@ def test_the_large_signal_limit_is_the_last_good_value_to_the_tolerance(toleranc
 
 
 @pytest.mark.usefixtures("stubbed")
-def test_of_two_objectives_the_one_is_shown_whose_bound_is_missed_first() -> None:
+def test_of_two_objectives_the_one_is_shown_whose_bound_is_missed_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "local_limits", lambda *given: LinearLimit(reason="not looked for"))
     judged = Criterion(good="settling_time < 5 and ultimate_bound < 0.05")
     system = dataclasses.replace(scenario_of().as_system(), criterion=judged)
     found = limits.limit(system, "components.controller.sampling.period", first=0.01, last=0.05)
