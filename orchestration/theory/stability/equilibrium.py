@@ -19,7 +19,7 @@ PULSES = 32
 ROUNDS = 30
 """Repetitions at most"""
 BALANCED = 1e-12
-"""What is missing then, relative where signals are above 1"""
+"""The imbalance that remains then, relative where signals are above 1"""
 
 
 class Steady:
