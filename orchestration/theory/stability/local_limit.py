@@ -180,10 +180,12 @@ def _rate(
 
 
 def _known_at_own(at: Callable[[float], System], span: Range, instances: Instances) -> KnownTangents:
-    """Where the system itself comes to rest, if it runs to rest: of an unstable one the search may find where."""
+    """Where the system itself comes to rest, if it runs to rest; else, as where it is unstable, that of an end."""
     known = KnownTangents()
-    with suppress(UsageError):
-        keep_start(at(span.first if span.own is None else span.own), instances, known)
+    for value in (span.own, span.values()[0], span.last):
+        if value is not None and known.start is None:
+            with suppress(UsageError):
+                keep_start(at(value), instances, known)
     return known
 
 

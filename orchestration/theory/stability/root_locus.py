@@ -218,8 +218,11 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
             high = radius_if_any(tried[-1])
-            if high is None and radius_if_any(tried[0]) is None:
-                raise UsageError(without[tried[-1]])
+            if high is None:
+                if radius_if_any(tried[0]) is None:
+                    raise UsageError(without[tried[-1]])
+                del without[tried[-1]]  # near the rest that is known now it may have one
+                high = radius_if_any(tried[-1])
             for place in range(len(tried) - 2, -1, -1):
                 above, high = high, radius_if_any(tried[place])
                 report(1.0 - place / len(tried))

@@ -46,6 +46,21 @@ def test_deviations_that_decay_in_a_band_about_the_own_value_have_both_ends(monk
     assert below.reason == "small deviations decay at each value tried from 310 ms to 480 ms, where the scan ends"
 
 
+def test_of_an_own_value_without_a_rest_that_of_an_end_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    def rests(system: System, _: Any, known: Any) -> None:
+        if system.stop_time > 0.3:
+            raise UsageError("no rest")
+        known.start = system
+
+    def growth(system: System, _: Any, factor: float = 1.0, known: Any = None) -> float:
+        assert known.start.stop_time == 0.05
+        return system.stop_time - 0.31
+
+    monkeypatch.setattr(local_limit, "keep_start", rests)
+    monkeypatch.setattr(local_limit, "growth_of_loop", growth)
+    assert local_limit.about_rest(at, replace(SPAN, own=0.4)).limit == pytest.approx(0.31)
+
+
 @pytest.mark.parametrize(("enough", "limit"), [(1.0, 0.5), (100.0, None), (1e9, None)])
 def test_a_pulse_that_rounding_blurs_is_not_believed(
     monkeypatch: pytest.MonkeyPatch, enough: float, limit: float | None

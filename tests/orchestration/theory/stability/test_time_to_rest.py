@@ -1,6 +1,7 @@
 """Systems that run to rest, as an integral does away from zero: a DC servo behind a bias of its amplifier."""
 
 import dataclasses
+import math
 from contextlib import closing
 from typing import Any
 
@@ -84,6 +85,8 @@ def test_gains_that_are_unstable_have_poles_at_a_rest_that_no_run_finds(servo: S
             known.start = start
             found = growth_of_loop(changed(servo, {path: 4.0 / of}), instances, known=known)
             assert found == pytest.approx(expected, rel=1e-6)
+    beyond = locus(changed(servo, {gain: 4.0}), gain, first=own, last=4.0, count=2)
+    assert beyond.radius[1] == pytest.approx(math.exp(expected * PERIOD), rel=1e-6)
     near = [each.tuned_to(in_fixed_periods(changed(servo, {gain: 4.0}))) for each in (tunable, fixed)]
     assert [len(each.saved) for each in near if each is not None] == [2, 1]
     with pytest.raises(UsageError, match=rf"{gain} = 4: .*unstable here"):
