@@ -38,7 +38,6 @@ def sweep(
     time_limit: TimeLimit = None,
 ) -> CommandResult:
     """Run the missing runs of a study; it can be stopped and resumed at any time."""
-    from orchestration.experiments.studies.store import note_on_engines
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import sweep as run_missing
     from orchestration.simulation.workers.choice import engine_choice
@@ -53,8 +52,6 @@ def sweep(
     lines = [f"{summary.path}: {summary.total} runs, {summary.flown} of them new{failed}"]
     if summary.agreement is not None:
         lines.append(f"engine {summary.engine}: {summary.agreement}")
-    if note := note_on_engines(summary.engines):
-        warn(note)
     for each in summary.follows:
         inform(f"follows {each}")
     keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")

@@ -18,9 +18,8 @@ from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.experiments.studies.axes import Axis, quantity_of
 from orchestration.experiments.studies.cell_figures import cell_maps
-from orchestration.experiments.studies.figures import made, save
+from orchestration.experiments.studies.figures import save
 from orchestration.experiments.studies.shares import GOOD
-from orchestration.experiments.studies.table import note_in
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -45,17 +44,16 @@ def draw(
     units: Mapping[str, str],
 ) -> list[Path]:
     """Draw all pictures into a folder; their paths. `units` are those of the store, by name of axis and metric."""
-    note = note_in(table)
     pictures = _pictures(comparison, outcome, table, units)
-    return [path for name, make in pictures for path in save(make, folder / name, style, note=note)]
+    return [path for name, make in pictures for path in save(make, folder / name, style)]
 
 
 def figures_of(
     comparison: Comparison, outcome: Outcome, table: "pd.DataFrame", style: Style, *, units: Mapping[str, str]
 ) -> dict[str, Figure]:
     """The figures of all pictures, by name."""
-    note = note_in(table)
-    return {name: made(make, style, note=note) for name, make in _pictures(comparison, outcome, table, units)}
+    with style.applied():
+        return {name: make(style) for name, make in _pictures(comparison, outcome, table, units)}
 
 
 def _pictures(

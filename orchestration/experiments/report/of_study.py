@@ -18,7 +18,7 @@ from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, re
 from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axes import Axis, quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
-from orchestration.experiments.studies.store import note_on_engines, open_for_reading
+from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.sweep import AGREEMENT, expect_current
@@ -237,8 +237,7 @@ def summary_of(overall: ReportShare, words: tuple[str, str], stored: Stored) -> 
     failed = sum(row["status"] == "failed" for row in stored.rows)
     text += f"), {outcomes[DIVERGED]} diverged"
     text += f", {outcomes[TERMINATED]} terminated" if outcomes[TERMINATED] else ""
-    note = note_on_engines(Counter(row["engine"] for row in stored.rows if row["engine"] is not None))
-    return text + (f", {failed} failed" if failed else "") + (f"; {note}." if note else ".")
+    return text + (f", {failed} failed." if failed else ".")
 
 
 def _percent(share: float) -> str:

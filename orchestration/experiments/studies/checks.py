@@ -101,9 +101,21 @@ class _RunChecks:
                 system = study.system(index, self._columns.files.start_values)
                 self.systems.expect(system)
         except UsageError as error:
-            return error
+            return UsageError(self._as_set(str(error)))
         self.longest = max(self.longest, system, key=lambda one: one.stop_time)
         return None
+
+    def _as_set(self, text: str) -> str:
+        """An error with targets that stand for several paths, such as `timing.loss`, in place of these."""
+        study = self._columns.study
+        targets = {target for axis in study.axes for target in axis.targets}
+        targets |= {target for each in study.together for target in each.targets}
+        for target in targets:
+            names = {study.base.in_own_terms(path) for path in study.paths_of([target])}
+            if len(names) > 1:
+                for name in names - targets:
+                    text = text.replace(f"{name} = ", f"{target} = ")
+        return text
 
 
 class _SystemChecks:

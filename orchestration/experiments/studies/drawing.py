@@ -17,10 +17,10 @@ from orchestration.experiments.studies.shares import BOOLEAN, GOOD, judged_by, w
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import frame, note_in, place_of, rows_at, units_in
+from orchestration.experiments.studies.table import frame, place_of, rows_at, units_in
 from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.terminal import Share, warn
+from orchestration.foundation.basics.terminal import Share
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.objectives import bound_of, judged_objective
@@ -81,9 +81,6 @@ def study_figures(
     if metric is None:
         metric = _default_metric_of(study, table)
     indices = indices_of(study, numbers(table, metric), metric) if _is_screened(study) else []
-    if note := note_in(table):
-        warn(note)
-    note = "\n".join(filter(None, (place_of(study, at, units), note))) or None
     with style.applied():
         if indices:
             drawn = {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}
@@ -91,7 +88,7 @@ def study_figures(
             axes = tuple(axis for axis in study.cell_axes if axis.name not in at)
             drawn = _over_axes(study, axes, table, metric, units, style)
         for figure in drawn.values():
-            figures.add_note(figure, note, style)
+            figures.add_note(figure, place_of(study, at, units), style)
     return drawn, indices
 
 

@@ -169,25 +169,18 @@ def good_runs(table: "pd.DataFrame") -> "pd.Series":
     return table["good"].eq(1).fillna(False).astype(bool)
 
 
-def add_note(figure: Figure, note: str | None, style: Style) -> None:
+def add_note(figure: Figure, note: str, style: Style) -> None:
     """Write a note above a figure, below its title; a paper has its caption for both."""
-    if note is not None:
-        figure.set_label("; ".join(filter(None, (str(figure.get_label()), *note.split("\n")))))
-    if note is not None and style.has_titles:
+    figure.set_label("; ".join(filter(None, (str(figure.get_label()), note))))
+    if note and style.has_titles:
         figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), note))), size="medium")
 
 
-def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN, *, note: str | None = None) -> list[Path]:
-    """Make a figure in a style, with a note, and write it as `path` with the suffix of each format; the paths."""
-    return write({path.name: made(make, style, note=note)}, path.parent, style)
-
-
-def made(make: Callable[[Style], Figure], style: Style, *, note: str | None) -> Figure:
-    """A figure in a style, with a note."""
+def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN) -> list[Path]:
+    """Make a figure in a style, and write it as `path` with the suffix of each format; the paths."""
     with style.applied():
         figure = make(style)
-        add_note(figure, note, style)
-    return figure
+    return write({path.name: figure}, path.parent, style)
 
 
 def by_horizon(table: "pd.DataFrame") -> str:

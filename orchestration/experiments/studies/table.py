@@ -13,11 +13,10 @@ from pyarrow import csv
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import shares
 from orchestration.experiments.studies.axes import quantity_of
-from orchestration.experiments.studies.store import Store, note_on_engines, open_for_reading
+from orchestration.experiments.studies.store import Store, open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS, metrics_with
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError, expected_name
-from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.recording import mat_file
 from orchestration.simulation.runs.run_directory import MAT, load_run
 from orchestration.systems.system.requirements import is_number
@@ -73,11 +72,6 @@ def place_of(study: Study, at: Mapping[str, Any], units: Mapping[str, str]) -> s
     """The values of some axes in words, as "delay 20 ms, loss 0.1"."""
     known = {axis.name: quantity_of(axis, units) for axis in study.axes if axis.name in at}
     return ", ".join(f"{known[k].name} {known[k].text_of(v) if is_number(v) else v}" for k, v in at.items())
-
-
-def note_in(table: "pd.DataFrame") -> str | None:
-    """What to say of the engines of a table's runs; None for one engine."""
-    return note_on_engines(table["engine"].value_counts().to_dict())
 
 
 def _columns(store: Store, axes: Sequence[str]) -> tuple[dict[str, list[Any]], dict[str, Any]]:
@@ -146,13 +140,11 @@ def export(
     second minus those of the first, as `differences`; of a `metric` its medians, as `medians_METRIC`, and of two laws
     those of its differences in pairs, as `differences_METRIC`; of one that is true or false, as `diverged`, its shares
     likewise, as `shares_METRIC`. Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs`
-    with a field for each column, and `units` with the same fields. Warns of runs by several engines.
+    with a field for each column, and `units` with the same fields.
     """
     import pandas as pd
 
     rows = frame(path) if rows is None else rows
-    if note := note_in(rows):
-        warn(note)
     tables, units = {"runs": rows}, units_in(path)
     if study is not None and study.cell_names is not None:
         cells, repeated = study.cell_names, shares.with_chance(rows, study)

@@ -149,3 +149,10 @@ def test_rows_of_runs_by_column_have_the_bits_of_runs_with_a_system_each(tmp_pat
 def bits(results: Results) -> tuple[Any, ...]:
     numbers = {name: values.tobytes() for name, values in results.numbers.items()}
     return numbers, results.texts, results.failed.tolist(), results.messages, results.engines
+
+
+def test_a_loss_that_is_wrong_is_named_as_its_axis_sets_it(files: Files) -> None:
+    both, one = axis("timing.loss", 0.0, 1.4), axis("timing.measurement_loss", 1.4)
+    for axes, name in (((both,), "loss"), ((one,), "measurement_loss"), ((both, one), "measurement_loss")):
+        with pytest.raises(UsageError, match=rf": timing\.{name} = 1\.4: expected a probability"):
+            check_design(RunColumns(study(*axes), files))
