@@ -142,7 +142,8 @@ def load(
 def base_of(file: HasBase, folder: Path) -> Request:
     """The system or scenario that a file is based on."""
     if file.scenario is not None and file.base:
-        raise UsageError("scenario and base: expected one of them")
+        own = ", ".join(f"[{key}]" if isinstance(value, dict) else key for key, value in file.base.items())
+        raise UsageError(f"scenario and base: expected one of them; put {own} into {file.scenario}")
     for key in ("scenario", "system"):
         if isinstance(name := file.base.get(key), str):
             raise UsageError(f'base.{key}: expected the path of a file in place of [base], as scenario = "{name}"')

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fmu_kit.new_files import write_atomically
+from orchestration.components.building.fmus import native_twin
 from orchestration.experiments.studies import store
 from orchestration.experiments.studies.checks import Checked, check_design, describe_run
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
@@ -119,6 +120,11 @@ def sweep(
             opened.describe({ENGINE: execution.name})
             if announce is not None and engine == "auto":
                 execution.tell(announce)
+            elif announce is not None and (slow := [fmu for fmu in files.fmus if native_twin(fmu) != fmu]):
+                announce(
+                    f"engine {execution.name}: slow, as {', '.join(slow)} run{'s' if len(slow) == 1 else ''} Python; "
+                    "--engine auto is fast, by native twins, in another folder, --out"
+                )
             task_of = partial(_task, study, files.start_values, time_limit)
             sample, chunk = Sample(), partial(chunks, total=len(missing), workers=workers)
             windows = _windows(opened, missing[:, 0])

@@ -288,7 +288,10 @@ def test_of_an_unknown_target_the_closest_is_named(target: str) -> None:
         ('[[axes]]\nname = "seed"\nstart = 1\nstop = 2\n', "design.samples = 0: expected at least 1"),
         (ONE + '[design]\nmethod = "guess"\n', "design.method = 'guess'"),
         (ONE + '[base]\n[base.timing]\nperiod = -1.0\n', "timing.period = -1.0: expected a positive number"),
-        ('scenario = "flight.toml"\n[base]\nstop_time = 1.0\n' + ONE, "scenario and base: expected one of them"),
+        (
+            'scenario = "flight.toml"\n[base]\nstop_time = 1.0\n[base.objectives]\nm = "1"\n' + ONE,
+            "scenario and base: expected one of them; put stop_time, [objectives] into flight.toml",
+        ),
         ('scenario = "nowhere.toml"\n' + ONE, "nowhere.toml: expected a readable system or scenario file"),
         ("[[axes\n", "expected TOML"),
     ],

@@ -56,6 +56,7 @@ def test_two_workers_make_the_same_rows_as_one_and_leave_no_files_behind(
     command = ("sweep", "study.toml", "--engine", "compiled", "--workers", "2")
     done = quadcosim(*command, cwd=folder, temporary=temporary)
     assert done.stdout.splitlines()[1:] == [f"{STORE}: {RUNS} runs, {RUNS} of them new"]
+    assert " run Python; --engine auto is fast, by native twins" in done.stderr
     assert bits(folder / STORE) == reference
     assert list(temporary.iterdir()) == []
 
