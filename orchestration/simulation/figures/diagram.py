@@ -129,8 +129,8 @@ def _arrows(system: System, places: Mapping[str, int]) -> list[_Arrow]:
     return arrows
 
 
-def _few(names: Sequence[str], most: int = 4) -> str:
-    return listed(names if len(names) <= most else {name.rpartition(".")[0] or name: None for name in names}, most)
+def _few(names: Sequence[str]) -> str:
+    return listed(names if len(names) <= 4 else {name.rpartition(".")[0] or name: None for name in names}, 4)
 
 
 def _lanes(arrows: Sequence[_Arrow]) -> dict[_Arrow, int]:

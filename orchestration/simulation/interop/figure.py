@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from orchestration.simulation.figures.palette import BLUE, GREEN, GREY, INDIGO, ORANGE, RED
-from orchestration.simulation.figures.style import SCREEN, Style, save
+from orchestration.simulation.figures.style import SCREEN, save
 from orchestration.simulation.interop.compare import TOLERANCE, Agreement
 from orchestration.systems.system.connection import component_of
 
@@ -33,9 +33,9 @@ def draw(agreements: Sequence[Agreement], folder: Path) -> list[Path]:
     return save({"interop": chart}, folder)
 
 
-def agreement_chart(agreements: Sequence[Agreement], style: Style = SCREEN) -> Figure:
+def agreement_chart(agreements: Sequence[Agreement]) -> Figure:
     """A row for each tool; open: as it comes; filled: with the tool's first inputs in this master, too."""
-    figure = style.figure(10.0 + 3.0 * len(agreements))
+    figure = SCREEN.figure(10.0 + 3.0 * len(agreements))
     panel = figure.add_subplot()
     kinds = _kinds({signal for agreement in agreements for signal in agreement.as_it_comes})
     for row, agreement in enumerate(agreements):
@@ -53,7 +53,7 @@ def agreement_chart(agreements: Sequence[Agreement], style: Style = SCREEN) -> F
     panel.set(xscale="log", xlabel="largest difference from quadcosim's master [SI units]")
     panel.set_yticks(range(len(agreements)), [agreement.tool.name for agreement in agreements])
     panel.invert_yaxis()
-    style.set_title(figure, "open: as the tool comes; filled: with the tool's inputs of the first step in both")
+    SCREEN.set_title(figure, "open: as the tool comes; filled: with the tool's inputs of the first step in both")
     lines = {line.get_label(): line for line in reversed(panel.get_legend_handles_labels()[0])}
     names = [name for name in (*kinds, AIM) if name in lines]
     figure.legend([lines[name] for name in names], names, loc="outside lower center", ncols=len(names))

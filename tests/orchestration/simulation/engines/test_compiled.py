@@ -178,15 +178,19 @@ LOOP = System(
 )
 
 
-def test_what_sources_feed_is_the_same(fmu: Path, tmp_path: Path) -> None:
-    table = tmp_path / "table.csv"
+def every_source(folder: Path) -> dict[str, Source]:
+    """A source of each kind; the table lies in the folder."""
+    table = folder / "table.csv"
     table.write_text("time,u4y,u4z\n0,0.1,0.3\n0.37,1,7\n1,-2,0.7\n", encoding="utf-8")
-    sources = {
+    return {
         "table": Source(file=table, to=("plant.u4y", "controller.u4z")),
         "noise": Source(noise=0.01, period=0.007, to=("plant.u5y", "plant.u5z")),
         "one": Source(constant=0.3, to=("controller.u6y",)),
     }
-    both(replace(of(LOOP, fmu), sources=sources))
+
+
+def test_what_sources_feed_is_the_same(fmu: Path, tmp_path: Path) -> None:
+    both(replace(of(LOOP, fmu), sources=every_source(tmp_path)))
 
 
 CONDITIONS = {

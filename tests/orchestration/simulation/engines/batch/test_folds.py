@@ -15,7 +15,7 @@ from orchestration.systems.system.model import Criterion
 from orchestration.systems.system.paths import changed
 from tests.orchestration.components.fmi.small import needs_compiler
 from tests.orchestration.simulation.engines.batch.lanes import LOOP, assert_the_same_numbers
-from tests.orchestration.simulation.engines.test_compiled import Kept, of, ran
+from tests.orchestration.simulation.engines.test_compiled import Kept, every_source, of, ran
 
 pytestmark = needs_compiler
 
@@ -57,14 +57,9 @@ EVERY = {
 
 
 def test_every_function_over_every_kind_of_signal(fmu: Path, kept: Kept, tmp_path: Path) -> None:
-    table = tmp_path / "table.csv"
-    table.write_text("time,u4y,u4z\n0,0.1,0.3\n0.37,1,7\n1,-2,0.7\n", encoding="utf-8")
-    sources = {
-        "table": Source(file=table, to=("plant.u4y", "controller.u4z")),
-        "noise": Source(noise=0.01, period=0.007, to=("plant.u5y", "plant.u5z")),
-        "one": Source(constant=0.3, to=("controller.u6y",)),
-    }
-    first = replace(of(LOOP, fmu), sources=sources, objectives=EVERY, criterion=Criterion(good="max_held > 0"))
+    first = replace(
+        of(LOOP, fmu), sources=every_source(tmp_path), objectives=EVERY, criterion=Criterion(good="max_held > 0")
+    )
     crowd = [replace(first, seed=seed) for seed in range(3)] + [
         changed(first, {"components.controller.sampling.period": 0.03, "stop_time": 0.7}),
         changed(first, {"components.plant.parameters.place": 2.0, "sources.one.constant": 0.7}),
