@@ -104,6 +104,8 @@ def build(
     if slave is not None and slave not in MODELS:
         folder = builder.folder_of(slave)
         consent.agree(folder)
+        for path in builder.described_in(folder) if Path(slave).is_dir() else ():
+            inform(f"{path}: describes code in C, which is not built here: quadcosim wrap {path}")
     with progress_bar("building") as progress:
         how: Any = {"packing": packing, "systems": target, "progress": progress}
         return result_of_files(builder.build_slaves(slaves, out or folder / packing.folder, inform, **how))

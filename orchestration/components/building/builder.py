@@ -136,8 +136,8 @@ def slaves_of(folder: Path) -> list[Target]:
         raise UsageError(f"{folder}: expected a folder with modules that define slaves")
     slaves = translating_errors(slaves_in, folder)
     if not slaves:
-        if described := [path for path in sorted(folder.glob(f"*{WRAPPED}")) if _describes_c(path)]:
-            raise UsageError(f"{folder}: this is C already, of which an FMU is made by quadcosim wrap {described[0]}")
+        if described := described_in(folder):
+            raise _c_already(folder, described[0])
         for name in unfinished_in(folder):
             _expect_finished(folder, name)
         raise UsageError(f"{folder}: expected a module with a subclass of fmu_kit.slave.Slave that has a description")
@@ -147,6 +147,15 @@ def slaves_of(folder: Path) -> list[Target]:
 def _expect_finished(folder: Path, name: str) -> None:
     if left_open := unfinished_in(folder).get(name):
         raise UsageError(f"{name} has no {' and no '.join(left_open)}: expected a slave in {folder} to define it")
+
+
+def described_in(folder: Path) -> list[Path]:
+    """The files of a folder that describe code in C, of which `wrap` makes FMUs."""
+    return [path for path in sorted(folder.glob(f"*{WRAPPED}")) if _describes_c(path)]
+
+
+def _c_already(place: Path, described: Path) -> UsageError:
+    return UsageError(f"{place}: this is C already, of which an FMU is made by quadcosim wrap {described}")
 
 
 def _describes_c(path: Path) -> bool:
@@ -171,11 +180,14 @@ def slaves_named(text: str) -> list[Target]:
         raise UsageError(
             f"{text}: expected {' or '.join(MODELS)}, a folder with modules that define slaves, or FOLDER/NAME for one"
         )
+    if path.suffix == WRAPPED and path.is_file() and _describes_c(path):
+        raise _c_already(path, path)
     slaves = slaves_of(path.parent)
     named = [target for target in slaves if target.model == path.name]
     if not named:
         _expect_finished(path.parent, path.name)
-        raise UsageError(f"{text}: expected one of {', '.join(target.model for target in slaves)} in {path.parent}")
+        known = " or ".join(str(path.parent / target.model) for target in slaves)
+        raise UsageError(f"{text}: expected {known}, or {path.parent} for all slaves of its modules")
     return named
 
 

@@ -107,7 +107,11 @@ def git_author() -> str:
 
 def _expect_usable(name: str, model: str, module: str) -> None:
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or not model.isidentifier():
-        raise UsageError(f"{name!a}: expected a name of letters, digits and _ that begins with a letter, as hover_pd")
+        path = Path(name)
+        elsewhere = f"; in another folder: {path.name} with --out {path.parent}" if len(path.parts) > 1 else ""
+        raise UsageError(
+            f"{name!a}: expected a name of letters, digits and _ that begins with a letter, as hover_pd{elsewhere}"
+        )
     if model in MODELS:
         raise UsageError(f"{name}: an FMU of this project has this name; expected another one")
     taken = keyword.iskeyword(module) or module in sys.stdlib_module_names or _is_installed(module)

@@ -300,7 +300,7 @@ def periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
     """A warning for each such component of a run."""
     return [
         f"{name} ({models[name].name}): is sampled every {period:g} s, but its code believes {believed:g} s: what it "
-        "computes of time is wrong by that ratio"
+        f"computes of time is wrong by a factor of {max(period / believed, believed / period):.6g}"
         for name, (period, believed) in unbelieved_periods(system, models).items()
     ]
 

@@ -173,12 +173,20 @@ class System:
             if sampling is None or has_scheduled_instants(sampling):
                 continue
             if sampling.true_offset >= stop:
-                yield f"{place}.offset = {shown(sampling.offset)}: {end}, so {name} never samples"
+                hint = _if_milliseconds(sampling.offset)
+                yield f"{place}.offset = {shown(sampling.offset)}: {end}, so {name} never samples{hint}"
             elif sampling.true_offset + sampling.true_period >= stop:
-                yield f"{place}.period = {shown(sampling.period)}: {end}, so {name} samples only once"
+                hint = _if_milliseconds(sampling.period)
+                yield f"{place}.period = {shown(sampling.period)}: {end}, so {name} samples only once{hint}"
+        for place, computer in self.computers.items():
+            for name, task in computer.tasks.items():
+                if task.period is not None and task.offset + task.period >= self.stop_time:
+                    task_period = f"computers.{place}.tasks.{name}.period = {shown(task.period)}"
+                    yield f"{task_period}: {end}, so {name} runs at most once{_if_milliseconds(task.period)}"
         for x in self.connections:
             if (least := lowest(x.delay)) >= self.stop_time:
-                yield f"connections.{x.name}.delay = {shown(least)}: {end}, so none of its messages arrives"
+                late = f"connections.{x.name}.delay = {shown(least)}"
+                yield f"{late}: {end}, so none of its messages arrives{_if_milliseconds(least)}"
 
     def mismatches(self, parameters: Mapping[str, float]) -> tuple[str, ...]:
         """A system does not know which parameters of its components belong together."""
@@ -293,6 +301,11 @@ def expressions(system: System) -> list[tuple[str, str]]:
 
 
 @functools.lru_cache(maxsize=256)
+def _if_milliseconds(value: float) -> str:
+    """What a time [s] would be that was meant in milliseconds, where that may be."""
+    return "" if value < 1.0 else f" (times are in seconds: {value:g} ms is {value / 1000.0:g})"
+
+
 def _require_expressions(texts: tuple[tuple[str, str], ...]) -> None:
     """Raise `UsageError` for one that is not valid, or for a criterion that is no condition; cached for studies."""
     for place, text in texts:

@@ -426,7 +426,7 @@ def expect_whole_instances(system: System) -> None:
         if component.partition is not None:
             raise UsageError(
                 f"{name} is a partition, whose state is that of the whole instance: expected the code as one component "
-                "without partition, whose tasks run when they are due"
+                "without partition, whose tasks run when they are due; limit takes partitions, by runs"
             )
 
 

@@ -443,7 +443,8 @@ def test_what_is_no_zip_is_no_fmu(main: Main, here: Path, command: str) -> None:
     ],
 )
 def test_a_timing_that_the_run_is_too_short_for_is_warned_of(main: Main, flags: list[str], warning: str) -> None:
-    assert f"warning: {warning}" in main("run", *SHORT, "--json", *flags).stderr.splitlines()
+    told = f"warning: {warning} (times are in seconds: 5 ms is 0.005)"
+    assert told in main("run", *SHORT, "--json", *flags).stderr.splitlines()
     assert "warning" not in main("run", *SHORT, "--json", flags[0], "0.01").stderr
 
 

@@ -19,6 +19,7 @@ from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
 from tests.commands import Main
 from tests.extent import sample
+from tests.places import EXAMPLES
 
 PD_H = """\
 typedef struct { double x, v; } pd_in;
@@ -465,6 +466,18 @@ def test_what_makes_c_of_python_says_that_code_in_c_is_c_already(place: str, tmp
     (tmp_path / "tasks.toml").write_text(TASKS)
     with pytest.raises(UsageError, match=r"this is C already, .* by quadcosim wrap .*tasks\.toml$"):
         builder.slaves_named(str(tmp_path / place))
+
+
+def test_beside_slaves_in_python_what_is_c_already_is_named(main: Main, tmp_path: Path) -> None:
+    (tmp_path / "tasks.toml").write_text(TASKS)
+    shutil.copy(EXAMPLES / "dc_motor" / "motor.py", tmp_path)
+    with pytest.raises(UsageError, match=r"this is C already, .* by quadcosim wrap .*tasks\.toml$"):
+        builder.slaves_named(str(tmp_path / "tasks.toml"))
+    with pytest.raises(UsageError, match=rf"Moto: expected {tmp_path}/Motor, or {tmp_path} for all slaves of its"):
+        builder.slaves_named(str(tmp_path / "Moto"))
+    done = main("build", tmp_path)
+    assert done.stdout.split() == [str(tmp_path / "Motor.fmu")]
+    assert f"{tmp_path}/tasks.toml: describes code in C, which is not built here: quadcosim wrap" in done.stderr
 
 
 def _output(fmu: Path, inputs: dict[str, float]) -> float:

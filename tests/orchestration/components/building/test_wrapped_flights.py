@@ -73,7 +73,7 @@ def test_a_run_at_another_period_warns_and_at_its_own_does_not(integrator: Path)
     slow = changed(system, {"stop_time": 1.0, "components.controller.sampling.period": 0.2})
     assert run(slow).warnings == (
         "controller (Pd): is sampled every 0.2 s, but its code believes 0.05 s: what it computes of time is wrong by "
-        "that ratio",
+        "a factor of 4",
     )
     (told,) = run(alone(integrator.with_name("Pd.fmu"), interval=0.2, stop_time=1.0)).warnings
     assert told.startswith("Pd (Pd): is sampled every 0.2 s, but its code believes 0.05 s")

@@ -8,8 +8,11 @@ import pytest
 import quadcosim
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.simulation.requests.request import request_of
 from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.systems.system.proposal import propose
+from orchestration.systems.system.request import system_of
+from orchestration.theory.stability.loop_at_rest import expect_whole_instances
 from tests.orchestration.components.fmi.exchange import clock, exchange, partitions
 from tests.orchestration.components.fmi.small import needs_compiler
 
@@ -132,3 +135,9 @@ def test_an_fmu_for_scheduled_execution_alone_says_what_it_needs(tmp_path: Path)
     assert proposed.count('partition = "inClock') == 3
     (tmp_path / "system.toml").write_text(proposed)
     assert quadcosim.run(tmp_path / "system.toml", in_process=True).warnings == ()
+
+
+def test_linear_theory_says_what_takes_partitions_instead(tmp_path: Path) -> None:
+    instead = r"one component without partition, whose tasks run when they are due; limit takes partitions, by runs$"
+    with pytest.raises(UsageError, match=rf"^a is a partition, .*: expected the code as {instead}"):
+        expect_whole_instances(system_of(request_of(sampled(tmp_path, a={}))))

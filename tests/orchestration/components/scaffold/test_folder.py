@@ -133,7 +133,7 @@ def _expect_linear_theory(system: System) -> None:
     [
         ("9lives", "expected a name of letters"),
         ("a.b", "expected a name of letters"),
-        ("../up", "expected a name of letters"),
+        ("../up", r"as hover_pd; in another folder: up with out \.\.$"),
         ("é", "expected a name of letters"),
         ("json", "json is a module or a keyword of Python"),
         ("class", "class is a module or a keyword of Python"),

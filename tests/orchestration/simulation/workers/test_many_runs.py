@@ -332,7 +332,8 @@ def test_runs_whose_controller_believes_another_plant_are_warned_of_once(capsys:
     assert capsys.readouterr().err == ""
     quadcosim.fly(brief, {"timing.period": [0.01, 30.0, 40.0]})
     assert capsys.readouterr().err == (
-        "warning: timing.period = 40.0: the run ends at 0.02 s, so controller samples only once\n"
+        "warning: timing.period = 40.0: the run ends at 0.02 s, so controller samples only once "
+        "(times are in seconds: 40 ms is 0.04)\n"
     )
 
 

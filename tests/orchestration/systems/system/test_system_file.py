@@ -13,7 +13,7 @@ from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.schedule.timetable import Timetable
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
-from orchestration.systems.system.file import load_system, schema
+from orchestration.systems.system.file import load_system, schema, system_from_tables
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 
@@ -182,6 +182,11 @@ def test_a_run_too_short_for_a_component_or_a_message_is_named() -> None:
     components = {"late": law(0.1, offset=0.6), "slow": law(0.5), "fast": law(0.1)}
     sent = [Connection(name=f"m{i}", start=("fast.y",), end=(f"slow.u{i}",), delay=d) for i, d in enumerate((0.7, 0.4))]
     ends = "the run ends at 0.5 s, so"
+    tasks = {name: {"period": period, "execution": 0.001} for name, period in (("fast", 0.1), ("slow", 10))}
+    meant = system_from_tables({"stop_time": 0.5, "computers": {"cpu": {"tasks": tasks}}}, Path())
+    assert [*meant.oversights()] == [
+        f"computers.cpu.tasks.slow.period = 10.0: {ends} slow runs at most once (times are in seconds: 10 ms is 0.01)"
+    ]
     assert [*System(stop_time=0.5, components=components, connections=tuple(sent)).oversights()] == [
         f"components.late.sampling.offset = 0.6: {ends} late never samples",
         f"components.slow.sampling.period = 0.5: {ends} slow samples only once",
