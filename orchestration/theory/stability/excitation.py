@@ -18,8 +18,10 @@ from orchestration.theory.stability.operating_point import AT_REST
 PULSE = 1e-6
 """Pulse of an input, up and down, with which the search for the best one begins: relative to its value, or absolute
 where that is smaller than 1"""
-MIN_PULSE, MAX_PULSE = 1e-9, 1.0
-"""Ends of that search"""
+MIN_PULSE, MAX_PULSE = 1e-24, 1.0
+"""Ends of that search: only of an instance that rests at 0 rounding lets the response to the smallest be seen"""
+LOST = 1e-9
+"""Pulse from which on smaller ones may be lost in rounding without a sign of it, as none is linear, too"""
 OTHER_SIZE = 1.5
 """Factor of the pulses that are compared: no power of two, which would be rounded alike"""
 MAX_DEVIATION = 0.01
@@ -283,7 +285,8 @@ class Excitation:
         """Choose the pulse; the number of rungs over which responses are linear.
 
         It is the pulse that is linear for longest, and of these the one to whose size and another responses agree best:
-        smaller ones are lost in rounding. The search goes upward only from responses that are linear.
+        smaller ones are lost in rounding. The search goes upward only from responses that are linear, and down as long as
+        a smaller one is linear for no shorter: of a response that grows.
         """
         tried = {PULSE: self._nonlinearity(rungs, PULSE)}
         early, pulse = len(tried[PULSE]) // 3, PULSE
@@ -295,12 +298,25 @@ class Excitation:
             rounding = tried[pulse][early]
         linear = {size: _linear(tried[size], max(NONLINEAR, LEAST * rounding)) for size in tried}
         best = max(linear, key=lambda size: linear[size])
-        pulse = PULSE
-        while best == pulse and linear[best][0] < len(rungs) and (pulse := 0.1 * pulse) >= MIN_PULSE:
+        pulse = best
+        while pulse <= PULSE and linear[pulse][0] == linear[best][0] < len(rungs) and 0.1 * pulse >= MIN_PULSE:
+            tried_before, pulse = pulse, 0.1 * pulse
+            if pulse < LOST and not self._responds_alike(rungs[: linear[best][0] + 1], pulse, tried_before):
+                break
             linear[pulse] = _linear(self._nonlinearity(rungs, pulse), max(NONLINEAR, LEAST * rounding))
             best = max(best, pulse, key=lambda size: linear[size][0])
         self.pulse = best
         return linear[best][0]
+
+    def _responds_alike(self, rungs: Sequence[Rung], pulse: float, larger: float) -> bool:
+        """Whether the response to a pulse is the one to a larger one."""
+        self.pulse = pulse
+        for i in range(len(self.inputs)):
+            here, there = (self.response(i, rungs, factor=factor) for factor in (1.0, larger / pulse))
+            count = min(len(here), len(there))
+            if np.abs(here[:count] - there[:count]).max(initial=0.0) > COARSE * np.abs(there[:count]).max(initial=0.0):
+                return False
+        return True
 
     def _nonlinearity(self, rungs: Sequence[Rung], pulse: float) -> Floats:
         """The difference of responses to two sizes, relative to the largest so far, up to each rung."""

@@ -97,10 +97,13 @@ def _choose_pulse(excitation: Excitation, rungs: Sequence[Rung]) -> int:
 
 def _tangent(excitation: Excitation, sample: Rung, count: int, samples: int = 1) -> Tangent:
     """The tangent of a component whose samples, or groups of several, are alike, and linear over `count` of them."""
-    ladder = [sample] * max(1, count // 2)
+    ins, outs = len(excitation.inputs), len(excitation.outputs)
+    # As many states are seen in the futures as are produced: where it is linear over a few samples, none is left over.
+    points = max(1, count // 2 if count >= 2 * FEWEST else round(count * outs / max(1, ins + outs)))
+    ladder = [sample] * max(1, count - points)
 
     def proved(excitation: Excitation) -> Tangent:
-        tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2))
+        tangent = Tangent(excitation, ladder, max(FEWEST, _dead_samples(excitation, ladder) + 2), points=points)
         tangent.prove(sample.h, 2.0 * len(ladder) * sample.h)
         return tangent
 

@@ -52,7 +52,8 @@ ROUNDED = 4.0 * float(np.finfo(float).eps)
 class Tangent(LinearSimulator):
     """A component about rest; as a `Simulator` it is linear, and begins at rest.
 
-    The rungs of `ladder` produce and identify states, at `fewest` rungs at least, and `most` states, the strongest.
+    The rungs of `ladder` identify states, and the first `points` of them produce these, at `fewest` rungs at least; it
+    has `most` states, the strongest.
     Where the component only takes steps of a `unit`, these are whole numbers of it. Raises `UsageError` for a component
     with more states than these show.
     """
@@ -65,10 +66,11 @@ class Tangent(LinearSimulator):
         *,
         unit: float | None = None,
         most: int = sys.maxsize,
+        points: int = sys.maxsize,
     ) -> None:
         super().__init__(excitation.inputs, excitation.outputs, states=0)  # set below, once they are found
         self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
-        self._fewest, self._most = fewest, most
+        self._fewest, self._most, self._points = fewest, most, min(points, len(self.ladder))
         self._known: dict[int, tuple[Floats, Floats]] = {}
         self.accuracy = 0.0
         self._find_coordinates(excitation.errors_over(ladder), fewest)
@@ -158,7 +160,9 @@ class Tangent(LinearSimulator):
         """The same with pulses times a factor, at no more states: what rounding adds to them is none."""
         excitation = copy(self._excitation)
         excitation.pulse *= factor
-        again = Tangent(excitation, self.ladder, self._fewest, unit=self.unit, most=len(self.state))
+        again = Tangent(
+            excitation, self.ladder, self._fewest, unit=self.unit, most=len(self.state), points=self._points
+        )
         return again
 
     def prove(self, h: float, duration: float) -> None:
@@ -181,8 +185,10 @@ class Tangent(LinearSimulator):
         for k, move in enumerate(moves):
             after = by_state @ state + by_input @ move
             predicted[k], state = after[:cut], after[cut:]
-        largest = np.abs(measured).max(axis=0, initial=0.0)
-        error = np.abs(measured - predicted).max(axis=0, initial=0.0)
+        growth = max(1.0, float(np.abs(np.linalg.eigvals(by_state[cut:])).max(initial=0.0)))
+        shrunk = growth ** -np.arange(count)[:, None]  # slow states are not hidden by those that grow
+        largest = np.abs(shrunk * measured).max(axis=0, initial=0.0)
+        error = np.abs(shrunk * (measured - predicted)).max(axis=0, initial=0.0)
         error = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
         self.accuracy = float((error / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
         if not self.accuracy <= UNPROVEN:
@@ -234,7 +240,7 @@ class Tangent(LinearSimulator):
         excitation, ladder = self._excitation, self.ladder
         latest = [excitation.after_pulse(i, ladder[0]) for i in range(len(self.inputs))]
         produced, columns, noise, ranks = list[States](), list[Floats](), list[Floats](), list[int]()
-        for point, rung in enumerate(ladder):
+        for point, rung in enumerate(ladder[: self._points]):
             produced += latest
             columns += [excitation.futures(states, ladder) for states in latest]
             noise += [errors.of_futures(i, point) for i in range(len(latest))]
@@ -261,10 +267,12 @@ class Tangent(LinearSimulator):
         errors = np.where(np.isfinite(errors), errors, largest)  # what could not be followed is not known at all
         errors += ROUNDING * np.abs(futures) + 1e-30 * largest
         rows, columns = np.ones((len(futures), 1)), np.ones(futures.shape[1])
+        times = np.cumsum([rung.duration for rung in self.ladder])
         for _ in range(SCALINGS):
             columns = 1.0 / np.sqrt(np.mean((errors * rows) ** 2, axis=0))
-            by_output = (errors * columns).reshape(-1, len(self.outputs), futures.shape[1])
-            rows = np.tile(1.0 / np.sqrt(np.mean(by_output**2, axis=(0, 2))), len(by_output))[:, None]
+            by_output = (errors * columns).reshape(-1, len(self.outputs), futures.shape[1]) ** 2
+            decay = _decay(times, np.sqrt(np.mean(by_output, axis=(1, 2))))[:, None]
+            rows = (decay / np.sqrt(np.mean(by_output * decay[:, :, None] ** 2, axis=(0, 2)))).reshape(-1, 1)
         left, values, _ = np.linalg.svd(futures * rows * columns, full_matrices=False)
         rank = min(int((values > STANDS_OUT * np.linalg.norm(errors * rows * columns, 2)).sum()), self._most)
         axes = left[:, :rank] * rows
@@ -289,6 +297,12 @@ class Tangent(LinearSimulator):
 
 def _steps(h: float, duration: float) -> int:
     return int(np.clip(duration / h, 2, PROOF_STEPS))
+
+
+def _decay(times: Floats, errors: Floats) -> Floats:
+    """The factors, exponential in time, by which errors that grow over these `times` [s] do not."""
+    growth = float(np.polyfit(times, np.log(errors), 1)[0]) if len(times) > 1 else 0.0
+    return np.asarray(np.exp(-max(0.0, growth) * times))
 
 
 def _most_independent(columns: Floats, count: int) -> list[int]:
