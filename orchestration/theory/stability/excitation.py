@@ -145,6 +145,11 @@ class Excitation:
         """The pulse of each input."""
         return self.pulse * self.scale
 
+    @property
+    def rounding(self) -> Floats:
+        """The error of rounding of each output, at most: smaller with pulses that only rest at 0 allows."""
+        return np.asarray(ROUNDING * self.weight * min(1.0, self.pulse / LOST))
+
     def pulsed(self, i: int, factor: float) -> Floats:
         """The inputs with a pulse on one of them, times `factor`."""
         held: Floats = self.held.copy()
@@ -285,8 +290,8 @@ class Excitation:
         """Choose the pulse; the number of rungs over which responses are linear.
 
         It is the pulse that is linear for longest, and of these the one to whose size and another responses agree best:
-        smaller ones are lost in rounding. The search goes upward only from responses that are linear, and down as long as
-        a smaller one is linear for no shorter: of a response that grows.
+        smaller ones are lost in rounding. The search goes upward only from responses that are linear, and down, of a
+        response that grows, while a smaller one is linear for no shorter.
         """
         tried = {PULSE: self._nonlinearity(rungs, PULSE)}
         early, pulse = len(tried[PULSE]) // 3, PULSE

@@ -189,7 +189,7 @@ class Tangent(LinearSimulator):
         shrunk = growth ** -np.arange(count)[:, None]  # slow states are not hidden by those that grow
         largest = np.abs(shrunk * measured).max(axis=0, initial=0.0)
         error = np.abs(shrunk * (measured - predicted)).max(axis=0, initial=0.0)
-        error = np.maximum(error - STANDS_OUT * ROUNDING * excitation.weight, 0.0)
+        error = np.maximum(error - STANDS_OUT * excitation.rounding, 0.0)
         self.accuracy = float((error / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
         if not self.accuracy <= UNPROVEN:
             raise UsageError(
@@ -224,7 +224,7 @@ class Tangent(LinearSimulator):
             measured = excitation.response_to(np.tile(move, (count, 1)), rung)
             late = slice(count // 2, None)
             size = np.maximum(np.abs(measured[late]).max(axis=0), SMALL * np.abs(measured).max(axis=0))
-            error = np.abs(measured - predicted[:count])[late].max(axis=0) - STANDS_OUT * ROUNDING * excitation.weight
+            error = np.abs(measured - predicted[:count])[late].max(axis=0) - STANDS_OUT * excitation.rounding
             found = float((np.maximum(error, 0.0) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
             if not found <= UNSEEN:
                 raise UsageError(

@@ -231,6 +231,44 @@ def test_a_model_without_a_slow_integral_is_refused_by_the_response_to_a_held_in
         without.prove_held(1.0)
 
 
+class Growing(Line):
+    """A law with states that grow and, hidden behind them, ones that decay; `offset` is what its states rest at."""
+
+    poles = np.array([-14.3, -12.7, 0.02, 0.5])
+
+    def __init__(self, offset: float = 0.0) -> None:
+        super().__init__(4)
+        self.kept, self.offset = np.full(4, offset), offset
+
+    def reader(self, names: Any, into: Floats) -> Transfer:
+        def read() -> None:
+            into[0] = sum(self.kept - self.offset)
+
+        return read
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = self.offset + self.poles * (self.kept - self.offset) + self.u
+
+
+def test_poles_far_outside_the_unit_circle_hide_none_inside_it() -> None:
+    measured = tangent(Growing())
+    found = np.linalg.eigvals(measured.derivatives(1.0)[0][1:])
+    assert np.sort(found.real) == pytest.approx(Growing.poles, rel=1e-3)
+    assert measured.accuracy < 1e-9
+
+
+def test_a_model_without_a_state_that_decays_beside_one_that_grows_is_refused() -> None:
+    excitation = Excitation(rest(Growing()))
+    excitation.pulse = 1e-20
+    with pytest.raises(UsageError, match="of 2 states, does not predict the response to a random input"):
+        Tangent(excitation, [Rung(1, 1.0)] * 8, 6, most=2).prove(1.0, 16.0)
+
+
+def test_where_rounding_hides_what_a_growing_response_does_the_states_are_refused() -> None:
+    with pytest.raises(UsageError, match="line: has more states than"):
+        tangent(Growing(0.7))
+
+
 class InSinglePrecision(Line):
     """Its sum with 9.81 is held in single precision."""
 
