@@ -24,6 +24,8 @@ MAX_FOURTH_PRODUCTS = 1e8
 """products to propagate fourth moments over a period"""
 MOST_DOUBLINGS = 60
 """Most doublings of the number of periods in a sum"""
+PASSES, MOST_VECTORS = 4, 400
+"""Vectors of a Krylov basis by the size of the state, and at most"""
 DENSE = 1200
 """numbers up to which an operator is made a matrix"""
 GROWTH = 1e-10
@@ -186,7 +188,7 @@ class JumpLinear:
             of_mean = self._basis.numbers([_geometric_sum(self._mean_map, first[0])])
             return self._basis.matrices(solve_fixed_point(self._by_chance(1.0), of_mean))
         if self.numbers > DENSE:
-            return self._basis.matrices(solve_fixed_point(self._propagate, added))
+            return self._basis.matrices(solve_fixed_point(self._propagate, added, _vectors(self._basis)))
         operator = np.array([self._propagate(unit) for unit in np.eye(self.numbers)]).T
         return self._basis.matrices(np.linalg.solve(np.eye(self.numbers) - operator, added))
 
@@ -253,11 +255,17 @@ def _geometric_sum(turn: Floats, added: Floats) -> Floats:
 def _radius(propagate: Map, basis: "_SymmetricBasis") -> float:
     if basis.count > SIZE:
         try:
-            return spectral_radius_of(_scaled(propagate, basis, _scales(propagate, basis)), basis.identity)
+            scaled = _scaled(propagate, basis, _scales(propagate, basis))
+            return spectral_radius_of(scaled, basis.identity, _vectors(basis))
         except UsageError:
             if basis.count > DENSE:
                 raise
     return _dense_radius(propagate, basis)
+
+
+def _vectors(basis: "_SymmetricBasis") -> int:
+    """Vectors of a Krylov basis: more than a message on its way needs to pass all others, for a part of it each."""
+    return min(MOST_VECTORS, max(SIZE, PASSES * max(basis.sizes)))
 
 
 def _dense_radius(propagate: Map, basis: "_SymmetricBasis") -> float:

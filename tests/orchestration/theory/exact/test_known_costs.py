@@ -161,3 +161,27 @@ def test_a_command_that_arrives_at_a_sample_acts_on_what_is_measured_at_the_next
     by_hand = np.array([[1.0, 1.0, 0.0], [-k, 0.0, -k * D], [0.0, 1.0, 0.0]])  # of x, u one period ago, and two
     radius = np.abs(np.linalg.eigvals(by_hand)).max()
     assert loop(system, components, {}, ("plant.u",), nodes=1).radius == pytest.approx(radius**2, rel=1e-9)
+
+
+def test_bursts_behind_a_long_line_cost_what_two_maps_in_turn_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands 80 samples late, a fifth of them lost in bursts of three: moments by whether the last one was lost."""
+    late, gain, lost, burst = 80, 0.005, 0.2, 3.0
+    monkeypatch.setattr("tests.orchestration.theory.exact.common.GAIN", gain)
+    found = integrator(delay=float(late), loss=lost, burst_length=burst)
+    rows = np.eye(late + 2)  # x, the command, those on their way, the newest first
+    turns = [
+        np.vstack([rows[0] + rows[-1], rows[-1], newest, rows[2:-1]])
+        for newest in (-gain * rows[0], rows[2])  # one that is lost is as the one before
+    ]
+    ends, begins = 1.0 / burst, lost / (burst * (1.0 - lost))
+    chance, shares = np.array([[1.0 - begins, begins], [ends, 1.0 - ends]]), (1.0 - lost, lost)
+    moments: list[Any] = [np.zeros((late + 2, late + 2))] * 2
+    for _ in range(1000):
+        moments = [
+            turns[j] @ (chance[0, j] * moments[0] + chance[1, j] * moments[1]) @ turns[j].T
+            + shares[j] * np.outer(rows[0], rows[0])
+            for j in (0, 1)
+        ]
+    P = moments[0] + moments[1]
+    known = P[0, 0] + P[0, -1] + P[-1, -1] / 3.0 + 0.5
+    assert found.costs()[0] == pytest.approx(known, rel=1e-8)
