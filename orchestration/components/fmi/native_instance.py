@@ -280,12 +280,15 @@ class NativeInstance(Instance):
     def restore_globals(self) -> None:
         """Restore what the FMU has changed of the whole process, with a warning."""
         if self.guard is not None:
-            if self.guard.restore_rounding():
-                self.warn_of_change(ROUNDING)
+            self._restore_rounding(self.guard)
             if self.guard.restore_folder():
                 self.warn_of_change(FOLDER)
             if self.guard.restore_limits():
                 self.warn_of_change(LIMITS)
+
+    def _restore_rounding(self, guard: Surroundings) -> None:
+        if guard.restore_rounding():
+            self.warn_of_change(ROUNDING)
 
     def warn_of_change(self, what: str) -> None:
         """Warn, once, that it has changed `what` of the whole process."""
@@ -392,8 +395,7 @@ class NativeInstance(Instance):
 
         def called(*arguments: Any) -> int:
             status = call(*arguments)
-            if guard.restore_rounding():
-                self.warn_of_change(ROUNDING)
+            self._restore_rounding(guard)
             return status
 
         return called
@@ -411,7 +413,10 @@ class NativeInstance(Instance):
         except FMICallException as error:
             raise self.failure(error.function, error.status) from None
         finally:
-            self.restore_globals()
+            if self.guard is not None and method in self.state_calls:  # as often as steps
+                self._restore_rounding(self.guard)
+            else:
+                self.restore_globals()
 
     def _expect_alive(self) -> None:
         if self.failed:

@@ -180,14 +180,13 @@ def _samples_until_alike(excitation: Excitation, sample: Rung) -> int:
 
     Raises `UsageError` where it does not repeat within `MOST_SAMPLES`.
     """
-    later, rest, responses = [sample] * MOST_SAMPLES, excitation.rest, list[Floats]()
+    seen, rest, responses = [sample] * (MOST_SAMPLES + 1), excitation.rest, list[Floats]()
     shares = 1.0 / (1.0 + (GOLDEN * np.arange(len(excitation.held))) % 1.0)  # no two inputs cancel, as their difference
     pulsed = excitation.held + shares * excitation.pulses
     for _ in range(2 * MOST_SAMPLES):
-        outputs, perturbed = excitation.stepped(rest, sample, pulsed)
-        unperturbed, rest = excitation.followed(rest, sample)
-        after = excitation.outputs_after(perturbed, later) - excitation.outputs_after(rest, later)
-        responses.append(np.vstack([outputs - unperturbed, after]) / excitation.pulse)
+        legs = [(pulsed, sample), *((excitation.held, sample) for _ in seen[1:])]
+        responses.append((excitation.course(rest, legs) - excitation.outputs_after(rest, seen)) / excitation.pulse)
+        _, rest = excitation.followed(rest, sample)
     allowed = TURN * max(1.0, max(float(np.abs(each).max(initial=0.0)) for each in responses))
     for samples in range(1, MOST_SAMPLES + 1):
         apart = (np.abs(a - b).max(initial=0.0) for a, b in zip(responses, responses[samples:]))
