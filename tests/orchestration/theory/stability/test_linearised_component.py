@@ -264,6 +264,15 @@ def test_a_model_without_a_state_that_decays_beside_one_that_grows_is_refused() 
         Tangent(excitation, [Rung(1, 1.0)] * 8, 6, most=2).prove(1.0, 16.0)
 
 
+def test_a_model_does_not_hold_where_a_state_that_growth_hides_decays_otherwise() -> None:
+    fmu = Growing()
+    at_rest, measured = fmu.save(), tangent(fmu)
+    for changed in (False, True):
+        fmu.restore(at_rest)
+        fmu.poles = Growing.poles * [1.0, 1.0, 1.0, 0.9 if changed else 1.0]
+        assert (measured.about(rest(fmu)) is None) == changed
+
+
 def test_where_rounding_hides_what_a_growing_response_does_the_states_are_refused() -> None:
     with pytest.raises(UsageError, match="line: has more states than"):
         tangent(Growing(0.7))
