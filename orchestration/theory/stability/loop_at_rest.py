@@ -50,8 +50,6 @@ SETTLED = 6
 """periods of the run to rest, after messages in transit have arrived"""
 INSTANTS = 1001
 """instants at which it is seen whether a source changes meanwhile"""
-SETTLING = 100
-"""samples that a component which begins anew is given to settle, its inputs held at those of a rest near by"""
 HELD = 2
 """messages that a first-order hold remembers"""
 
@@ -335,8 +333,9 @@ def _corrected(calm: System, period: Fraction, instances: Instances, known: Know
         ones = cast("Mapping[str, TracedInstance]", simulation.instances)
         for name, one in ones.items():
             one.begin(near.held[name])
-            if (sampling := calm.components[name].sampling) is not None:  # its outputs are those before
-                for _ in range(1 if name in near.saved else SETTLING):
+            if (sampling := calm.components[name].sampling) is not None:
+                # Its outputs are those before; one that begins anew has states that no input leads, as of a soft start.
+                for _ in range(1 if name in near.saved else math.ceil(time_to_rest(calm) / sampling.period)):
                     one.step(one.time - one.later, sampling.period)
         saved = {name: one.save() for name, one in ones.items()}
         loop = AtRest(simulation=simulation, saved_states=saved, extra=NO_SIGNALS, period=period, known=known)

@@ -3,11 +3,13 @@
 import dataclasses
 import math
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from orchestration.components.building import builder
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
@@ -19,9 +21,10 @@ from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
 from quadcosim import UsageError, linearise, locus
 from tests.examples.common import native_example
+from tests.places import EXAMPLES
 
 BIAS, DELAY, PERIOD, AFTER = 0.3, 0.002, 0.006, "operating_point.after"
-DELAY_PATH = "connections.command.delay"
+FMU, DELAY_PATH = "components.controller.fmu", "connections.command.delay"
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +71,7 @@ def test_other_delays_begin_where_the_own_one_has_come_to_rest_also_where_the_lo
 
 
 def test_gains_that_are_unstable_have_poles_at_a_rest_that_no_run_finds(servo: System) -> None:
-    """That of the controller does not move it, that of the amplifier does; one that is fixed needs a new instance.
-
-    If the own one has none, that is said.
-    """
+    """That of the controller does not move it, that of the amplifier does. If the own one has none, that is said."""
     gain, own = "components.controller.parameters.K", 0.96
     with closing(Instances()) as instances:
         expected = growth_of_loop(native_example("dc_servo", {gain: 4.0}), instances)
@@ -79,18 +79,37 @@ def test_gains_that_are_unstable_have_poles_at_a_rest_that_no_run_finds(servo: S
         known = KnownTangents()
         keep_start(servo, instances, known)
         assert known.start is not None
-        tunable = known.start
-        fixed = dataclasses.replace(tunable, tunable=frozenset())
-        for path, of, start in ((gain, 1.0, tunable), (gain, 1.0, fixed), ("connections.command.scale", own, tunable)):
+        start = known.start
+        for path, of in ((gain, 1.0), ("connections.command.scale", own)):
             known.start = start
             found = growth_of_loop(changed(servo, {path: 4.0 / of}), instances, known=known)
             assert found == pytest.approx(expected, rel=1e-6)
     beyond = locus(changed(servo, {gain: 4.0}), gain, first=own, last=4.0, count=2)
     assert beyond.radius[1] == pytest.approx(math.exp(expected * PERIOD), rel=1e-6)
-    near = [each.tuned_to(in_fixed_periods(changed(servo, {gain: 4.0}))) for each in (tunable, fixed)]
-    assert [len(each.saved) for each in near if each is not None] == [2, 1]
     with pytest.raises(UsageError, match=rf"{gain} = 4: .*unstable here"):
         locus(dataclasses.replace(servo, operating_point={"after": 0.01}), gain, first=0.96, last=4.0, count=2)
+
+
+def test_a_law_that_begins_anew_settles_for_as_long_as_a_run_does(tmp_path: Path, servo: System) -> None:
+    """Its command fades in over a second, by a state that no input moves; then its loop is that without."""
+    code, command = (EXAMPLES / "dc_servo" / "controller.py").read_text(), "K * error + self.integral + self.derivative"
+    faded = "self.faded = self.faded + 0.1 * (1.0 - self.faded)"
+    code = code.replace(
+        f"self.u = {command}", f"{faded}\n        self.u = max(0.0, 2.0 * self.faded - 1.0) * ({command})"
+    )
+    (tmp_path / "controller.py").write_text(code.replace("    K = ", '    faded = Local("share given", "1")\n    K = '))
+    builder.build_slaves(builder.slaves_of(tmp_path), tmp_path, packing=builder.IN_PYTHON)
+    gain, system = "components.controller.parameters.K", changed(servo, {FMU: str(tmp_path / "PidController.fmu")})
+    with closing(Instances()) as instances:
+        known, wanted = KnownTangents(), changed(system, {gain: 4.0})
+        keep_start(system, instances, known)
+        assert known.start is not None
+        known.start = dataclasses.replace(known.start, tunable=frozenset())
+        begun = known.start.tuned_to(in_fixed_periods(wanted))
+        assert begun is not None
+        assert list(begun.saved) == ["servo"]
+        found = growth_of_loop(wanted, instances, known=known)
+        assert found == pytest.approx(growth_of_loop(native_example("dc_servo", {gain: 4.0}), instances), rel=1e-6)
 
 
 def test_twin_runs_begin_at_the_same_rest(servo: System) -> None:
