@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.systems.system.component import Component, Sampling
@@ -164,8 +165,8 @@ def test_a_command_that_arrives_at_a_sample_acts_on_what_is_measured_at_the_next
 
 
 def test_bursts_behind_a_long_line_cost_what_two_maps_in_turn_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Commands 80 samples late, a fifth of them lost in bursts of three: moments by whether the last one was lost."""
-    late, gain, lost, burst = 80, 0.005, 0.2, 3.0
+    """Commands 50 samples late, a fifth of them lost in bursts of three: moments by whether the last one was lost."""
+    late, gain, lost, burst = 50, 0.008, 0.2, 3.0
     monkeypatch.setattr("tests.orchestration.theory.exact.common.GAIN", gain)
     found = integrator(delay=float(late), loss=lost, burst_length=burst)
     rows = np.eye(late + 2)  # x, the command, those on their way, the newest first
@@ -175,13 +176,19 @@ def test_bursts_behind_a_long_line_cost_what_two_maps_in_turn_do(monkeypatch: py
     ]
     ends, begins = 1.0 / burst, lost / (burst * (1.0 - lost))
     chance, shares = np.array([[1.0 - begins, begins], [ends, 1.0 - ends]]), (1.0 - lost, lost)
-    moments: list[Any] = [np.zeros((late + 2, late + 2))] * 2
+
+    def later(P: Any, noise: float) -> Any:
+        """The moments a second later, by whether the last command is lost, with a density of noise."""
+        mixed = np.einsum("ij,ikl->jkl", chance, P)
+        return np.array([T @ M @ T.T + noise * q * np.outer(rows[0], rows[0]) for T, M, q in zip(turns, mixed, shares)])
+
+    moments = np.zeros((2, late + 2, late + 2))
     for _ in range(1000):
-        moments = [
-            turns[j] @ (chance[0, j] * moments[0] + chance[1, j] * moments[1]) @ turns[j].T
-            + shares[j] * np.outer(rows[0], rows[0])
-            for j in (0, 1)
-        ]
-    P = moments[0] + moments[1]
-    known = P[0, 0] + P[0, -1] + P[-1, -1] / 3.0 + 0.5
-    assert found.costs()[0] == pytest.approx(known, rel=1e-8)
+        moments = later(moments, 1.0)
+    P = moments.sum(axis=0)
+    assert found.costs()[0] == pytest.approx(P[0, 0] + P[0, -1] + P[-1, -1] / 3.0 + 0.5, rel=1e-8)
+    alone = LinearOperator(
+        (P.size * 2, P.size * 2), lambda x: later(x.reshape(moments.shape), 0.0).ravel(), dtype=float
+    )
+    (largest,) = eigs(alone, k=1, which="LR", v0=np.array([rows, rows]).ravel(), ncv=80, return_eigenvectors=False)
+    assert found.radius == pytest.approx(largest.real, rel=1e-8)
