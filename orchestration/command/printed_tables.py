@@ -7,6 +7,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
 from itertools import groupby
 from typing import Any
 
@@ -168,7 +169,7 @@ def decimals_of(count: int) -> int:
 
 
 def _signed(value: float, decimals: int) -> str:
-    """A number with some decimals, or as many as show that it is not 0."""
+    """A number with some decimals, half rounded away from 0, or as many as show that it is not 0."""
     if abs(value) >= 0.5 * 10.0**-decimals:
-        return f"{value:.{decimals}f}"
+        return str(Decimal(repr(float(value))).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP))
     return f"{value:.1g}" if abs(value) > 1e-9 else f"{0.0:.{decimals}f}"

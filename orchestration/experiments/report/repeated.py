@@ -185,7 +185,7 @@ def _value(axis: ColumnAxis, value: Any) -> float | str:
 
 
 def _shown(value: float, word: str | None) -> str:
-    return f"{100.0 * value:+.0f} %" if word is None and value else f"{100.0 * value:.0f} %"
+    return f"{100.0 * value:+.3g} %" if word is None and value else f"{100.0 * value:.3g} %"
 
 
 def _short(law: str) -> str:

@@ -2,9 +2,10 @@
 
 const { NOT_GOOD, SHADES: { OUTER_SHARE, OUTLIER_RATIO, MIN_RANGE, LOGARITHMIC_RATIO } } = FIGURES;
 const MARKS = { good: "circle", bad: "x-thin-open", diverged: "triangle-down-open" };
-const MARKS_OF_OTHER = { good: "diamond-open", bad: "cross-thin-open", diverged: "triangle-up-open" }; // of a second study
+const MARKS_OF_OTHER = { good: "diamond-open", bad: "cross-thin-open", diverged: "triangle-up-open" }; // of a second study or law
 const MAX_SYMBOLS = 2500;
 const VALUE = "value";
+const FOOT = 0.1; // share of the heights that marks without a value are below
 
 const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], isGrid: false, shades: null, box: null, inside: null };
 
@@ -286,10 +287,11 @@ function heights() {
   return map.rows.map((row) => cellOf(map.metric, row)).filter(Number.isFinite);
 }
 
-/** The height of marks without a value: the least of all values. */
+/** The height of marks without a value: below all values. */
 function footOf(values) {
-  const foot = values.reduce((least, value) => Math.min(least, value), Infinity);
-  return Number.isFinite(foot) ? foot : 0;
+  if (!values.length) return 0;
+  const [low, high] = values.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
+  return isWide(heights()) ? low * (low / high) ** FOOT : low - FOOT * (high - low || Math.abs(low) || 1);
 }
 
 function nameOfMarks(kind, values) {
@@ -297,9 +299,9 @@ function nameOfMarks(kind, values) {
   return escaped(`${word} (${values.length}${values.some(Number.isNaN) ? "; without a value at the foot" : ""})`);
 }
 
-function pointTraces(foot = footOf(heights())) {
+function pointTraces(foot = footOf(heights()), all = map.rows, of = "", [marks, color] = [MARKS, null]) {
   return ["good", "bad", "diverged"].flatMap((kind) => {
-    const rows = map.rows.filter((row) => kindOf(outcomeOf(row)) === kind);
+    const rows = all.filter((row) => kindOf(outcomeOf(row)) === kind);
     if (!rows.length) return [];
     const height = (row) => {
       if (map.y !== VALUE) return cellOf(map.y, row);
@@ -307,12 +309,12 @@ function pointTraces(foot = footOf(heights())) {
       return Number.isNaN(value) ? foot : value;
     };
     const colored = kind === "good" && map.y !== VALUE;
-    const plain = { good: COLORS[0], bad: paint("bad"), diverged: COLORS[1] }[kind];
+    const plain = color ?? { good: COLORS[0], bad: paint("bad"), diverged: COLORS[1] }[kind];
     return {
-      type: "scatter", mode: "markers", name: nameOfMarks(kind, rows.map((row) => (map.y === VALUE ? cellOf(map.metric, row) : 0))),
+      type: "scatter", mode: "markers", name: escaped(of) + nameOfMarks(kind, rows.map((row) => (map.y === VALUE ? cellOf(map.metric, row) : 0))),
       x: rows.map((row) => cellOf(map.x, row)), y: rows.map(height), customdata: rows, said: (i) => hoverOf(rows[i]), faded: rows.map(isOutside),
       marker: {
-        symbol: MARKS[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" ? 0 : 1.5, color: plain },
+        symbol: marks[kind], size: kind === "good" ? 7 : 8, line: { width: kind === "good" && marks === MARKS ? 0 : 1.5, color: plain },
         color: colored ? rows.map((row) => colorOf(cellOf(map.metric, row))) : plain,
         ...(colored ? { colorscale: "Viridis", colorbar: colorBar(), cmin: map.shades.low, cmax: map.shades.high } : {}),
       },

@@ -43,15 +43,16 @@ function drawRepeated() {
   const [columns, rows] = [different(here.map((cell) => cell.x)), different(here.map((cell) => cell.y))];
   const at = (i, j) => here.find((cell) => cell.x === columns[j] && cell.y === rows[i]);
   const table = (make) => rows.map((_, i) => columns.map((__, j) => { const cell = at(i, j); return cell ? make(cell) : null; }));
-  const room = byId("map-plot").clientWidth > 46 * columns.length + 180;
+  const room = byId("map-plot").clientWidth > (isDifference ? 58 : 46) * columns.length + 180;
   const marked = isDifference ? here.filter((cell) => cell.low > 0 || cell.high < 0) : [];
+  const alone = room ? [] : marked;
   const heat = {
     type: "heatmap", x: columns, y: rows, z: table((cell) => cell.value), zmin: isDifference ? -1 : 0, zmax: 1, xgap: 1,
-    colorscale: isDifference ? "Differences" : "Cividis", text: table((cell) => (room && !marked.includes(cell) ? cell.text : "")),
+    colorscale: isDifference ? "Differences" : "Cividis", text: table((cell) => (room ? cell.text + (marked.includes(cell) ? " ●" : "") : "")),
     customdata: table((cell) => here.indexOf(cell)), said: (i, j) => hoverOfRepeated(at(i, j)),
     colorbar: { tickformat: ".0%", title: { text: isDifference ? "difference of the shares" : "share" }, ...(isNarrowMap() ? { orientation: "h" } : {}) },
   };
-  const dots = { type: "scatter", mode: "markers", x: marked.map((cell) => cell.x), y: marked.map((cell) => cell.y), showlegend: false, marker: { symbol: "circle", size: 7, color: "#000", line: { width: 1, color: "#fff" } } };
+  const dots = { type: "scatter", mode: "markers", x: alone.map((cell) => cell.x), y: alone.map((cell) => cell.y), showlegend: false, marker: { symbol: "circle", size: 7, color: "#000", line: { width: 1, color: "#fff" } } };
   const layout = {
     height: isNarrowMap() ? 520 : 430, margin: { l: 66, r: 10, t: 10, b: isNarrowMap() ? 120 : 50 }, showlegend: false,
     xaxis: { ...axisLayout(x), showgrid: false }, yaxis: { ...axisLayout(y), showgrid: false },
@@ -109,9 +110,14 @@ function openRepeated(cell) {
   drawRunsOfCell().then(() => openRow(firstOf(map.rows)));
 }
 
-/** The runs of the open cell, and those of a second study with marks of their own. */
+/** The runs of the open cell, and those of a second study or law with marks of their own. */
 function tracesOfCell() {
   const { others } = cells.open;
+  const different = (axis) => [...new Set(map.rows.map((row) => cellOf(axis, row)))];
+  const law = axes.find((axis) => axis.words && axis !== map.x && different(axis).length === 2);
+  if (law && !report.other) {
+    return different(law).flatMap((name, i) => pointTraces(footOf(heights()), map.rows.filter((row) => cellOf(law, row) === name), `${name.split("/").at(-1)}: `, i ? [MARKS_OF_OTHER, COLORS[2]] : undefined));
+  }
   if (!others?.length) return pointTraces();
   const columns = new Map(report.other.table.columns.map((column) => [column.name, column]));
   const at = (name, row) => (columns.has(name) ? cellOf(columns.get(name), row) : NaN);
@@ -119,7 +125,7 @@ function tracesOfCell() {
   const wanted = new Set(others);
   const rows = [...Array(report.other.table.count).keys()].filter((row) => wanted.has(at("design_index", row)));
   const foot = footOf([...heights(), ...rows.map(valueOf).filter(Number.isFinite)]);
-  const own = pointTraces(foot).map((trace) => ({ ...trace, name: `${escaped(report.title)}: ${trace.name}` }));
+  const own = pointTraces(foot, map.rows, `${report.title}: `);
   const beside = Object.entries(MARKS_OF_OTHER).flatMap(([kind, symbol]) => {
     const those = rows.filter((row) => kindOf(at("outcome", row)) === kind);
     if (!those.length) return [];

@@ -312,6 +312,17 @@ def test_a_box_over_the_map_chooses_among_the_runs_until_all_are_taken_again(of_
     assert of_study.get_by_label("Flights").is_visible()
 
 
+def test_marks_of_diverged_runs_are_visibly_below_all_values(of_study: Any) -> None:
+    controls = of_study.locator("#map-controls select")
+    controls.nth(2).select_option("value")
+    heights = "Object.fromEntries(document.getElementById('map-plot').data.map((one) => [one.name, one.y]))"
+    wait_for(of_study, "document.getElementById('map-plot').data[0].name !== undefined")
+    found = of_study.evaluate(heights)
+    (down,) = (y for name, y in found.items() if name == "diverged (1; without a value at the foot)")
+    assert max(down) < 0.99 * min(y for name, ys in found.items() if "foot" not in name for y in ys if y)
+    controls.nth(2).select_option("timing.delay")
+
+
 def test_a_second_study_is_drawn_over_the_first(of_study: Any, show: Show) -> None:
     """The same study twice: the edges and shares of both are the same."""
     folder = Path(of_study.url.removeprefix("file://")).parent
@@ -362,11 +373,15 @@ def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_see
     assert opened == "difference, CascadedController minus UnifiedController"
     assert page.inner_text("#cell-title") == "period 10 ms, loss 0.5"
     assert page.get_by_label("4 of the cell").is_visible()  # two seeds of two laws
+    marks = page.evaluate("document.getElementById('cell-plot').data.map((one) => [one.name, one.marker.symbol])")
+    assert marks[:2] == [
+        ["UnifiedController: bounded (2)", "x-thin-open"], ["CascadedController: bounded (2)", "cross-thin-open"],
+    ]  # fmt: skip
     chosen.select_option("0")
     assert page.get_by_label("2 of the cell").is_visible()
     page.locator("#map-plot").press("ArrowRight")
     wait_for(page, "document.getElementById('cell-title').textContent === 'period 20 ms, loss 0.5'")
-    assert "0 of 2 settled: 0 %, 95 % interval 0 % to 66 %" in page.inner_text("#cell-text")
+    assert "0 of 2 settled: 0 %, 95 % interval 0 % to 65.8 %" in page.inner_text("#cell-text")
     assert {"0/2", "0/1"} <= {*page.locator("#map-plot text").all_text_contents()}
     page.close()
     page = show(report(swept, swept, out=tmp_path, flights=0))

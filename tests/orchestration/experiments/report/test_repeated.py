@@ -56,7 +56,7 @@ def test_two_laws_have_a_map_each_and_one_of_their_difference() -> None:
     lossy = cell(second, 20.0, 0.1)
     assert (lossy.text, lossy.value, (lossy.low, lossy.high)) == ("0/3", 0.0, wilson(0, 3))
     assert lossy.runs == (21, 22, 23)
-    assert lossy.said == "0 of 3 settled: 0 %, 95 % interval 0 % to 56 %"
+    assert lossy.said == "0 of 3 settled: 0 %, 95 % interval 0 % to 56.1 %"
     exact = cell(first, 10.0, 0.0)
     assert (exact.text, exact.low, exact.said) == ("1/1", None, "1 of 1 settled: 100 %, nothing is random")
     apart, ends = cell(difference, 20.0, 0.1), (wilson(0, 3), wilson(3, 3))
