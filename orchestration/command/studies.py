@@ -1,5 +1,6 @@
 """The commands that run, export and draw studies."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -54,6 +55,7 @@ def sweep(
         lines.append(f"engine {summary.engine}: {summary.agreement}")
     for each in summary.follows:
         inform(f"follows {each}")
+    _tell_if_undecided(summary.study, summary.outcomes)
     keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")
     document = {name: getattr(summary, name) for name in keys}
     return CommandResult(document=document, verdict=summary.verdict, lines=lines, good=not summary.failed)
@@ -186,6 +188,15 @@ def _current_store(study: Path, out: Path | None) -> Path:
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
         there, total = sum(opened.counts().values()), len(loaded.points)
+        outcomes = opened.outcomes()
     if there < total:
         warn(f"{path}: {there} of {total} runs; the others are missing, {_sweep_command(study, out)} runs them")
+    _tell_if_undecided(loaded, outcomes)
     return path
+
+
+def _tell_if_undecided(study: "Study", outcomes: Mapping[str | None, int]) -> None:
+    from orchestration.simulation.results.objectives import undecided
+
+    if note := undecided(study.origin, outcomes):
+        inform(note)

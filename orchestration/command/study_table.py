@@ -21,7 +21,15 @@ from orchestration.experiments.studies.shares import (
     without_value,
 )
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import OF_CELLS, expect_metric_of_cells, frame, place_of, rows_at, units_in
+from orchestration.experiments.studies.table import (
+    OF_CELLS,
+    expect_metric_of_cells,
+    frame,
+    meaning_of,
+    place_of,
+    rows_at,
+    units_in,
+)
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.requirements import is_number
@@ -85,6 +93,8 @@ def study_table(study: Study, store: Path, metric: str = GOOD, at: Sequence[str]
             texts = partial(texts, column="difference", count="pairs")
             caption += f"; difference: median of {minus} over the pairs that are both {word}"
         columns["difference"] = texts(first[by].merge(found, how="left", on=by))
+    if meaning := meaning_of(study, metric, units):
+        caption += f"; {meaning}"
     if chosen:
         caption += f"; at {place_of(study, chosen, units)}"
     if cells["low"].isna().any():

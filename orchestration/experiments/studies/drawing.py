@@ -17,13 +17,13 @@ from orchestration.experiments.studies.shares import BOOLEAN, GOOD, judged_by, w
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import frame, place_of, rows_at, units_in
+from orchestration.experiments.studies.table import frame, meaning_of, place_of, rows_at, units_in
 from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.results import display_names as labels
-from orchestration.simulation.results.objectives import bound_of, judged_objective
+from orchestration.simulation.results.objectives import bound_of, how_runs_ended, judged_objective
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,8 +87,9 @@ def study_figures(
         else:
             axes = tuple(axis for axis in study.cell_axes if axis.name not in at)
             drawn = _over_axes(study, axes, table, metric, units, style)
+        notes = [place_of(study, at, units), "" if study.repeat is None else meaning_of(study, metric, units)]
         for figure in drawn.values():
-            figures.add_note(figure, place_of(study, at, units), style)
+            figures.add_note(figure, "; ".join(filter(None, notes)), style)
     return drawn, indices
 
 
@@ -119,6 +120,8 @@ def _over_axes(
         if metric in BOOLEAN:
             table, of = judged_by(table, metric), GOOD
             words = words if metric == GOOD else (labels.metric(metric), f"not {labels.metric(metric)}")
+        else:
+            _expect_value(study, table, metric)
         if len(axes) == 1:
             return {metric: cell_lines(table, axes[0], panels, of, words, units=units, style=style)}
         return {f"{metric}_map": cell_maps(table, (axes[0], axes[1]), panels, of, words, units=units, style=style)}
@@ -134,6 +137,19 @@ def _over_axes(
     if len(axes) == 2 and all(axis.values is not None for axis in axes):
         drawn[f"{metric}_map"] = heat_map(table, axes, metric, words, units=units, style=style)
     return drawn
+
+
+def _expect_value(study: Study, table: "pd.DataFrame", metric: str) -> None:
+    """Raise `UsageError` if no good run has the metric, over which the medians of cells are."""
+    if study.origin.criterion.good is None or table.loc[figures.good_runs(table), metric].notna().any():
+        return
+    outcomes = table["outcome"].value_counts().to_dict()
+    word = study.origin.criterion.outcomes[0]
+    raise UsageError(
+        f"metric {metric}: expected a {word} run with a value of it, over which cells have medians; there are "
+        f"{how_runs_ended(outcomes, len(table))} by {study.origin.stop_time:g} s: try the shares (--metric good, "
+        "--metric diverged), or a longer stop_time"
+    )
 
 
 def indices_of(study: Study, values: Floats, metric: str) -> list[sensitivity.Index]:

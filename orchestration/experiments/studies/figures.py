@@ -173,7 +173,7 @@ def add_note(figure: Figure, note: str, style: Style) -> None:
     """Write a note above a figure, below its title; a paper has its caption for both."""
     figure.set_label("; ".join(filter(None, (str(figure.get_label()), note))))
     if note and style.has_titles:
-        figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), note))), size="medium")
+        figure.suptitle("\n".join(filter(None, (figure.get_suptitle(), style.in_lines(note)))), size="medium")
 
 
 def save(make: Callable[[Style], Figure], path: Path, style: Style = SCREEN) -> list[Path]:

@@ -18,6 +18,7 @@ from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEX
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.recording import mat_file
+from orchestration.simulation.results.objectives import criterion_in_words
 from orchestration.simulation.runs.run_directory import MAT, load_run
 from orchestration.systems.system.requirements import is_number
 
@@ -72,6 +73,20 @@ def place_of(study: Study, at: Mapping[str, Any], units: Mapping[str, str]) -> s
     """The values of some axes in words, as "delay 20 ms, loss 0.1"."""
     known = {axis.name: quantity_of(axis, units) for axis in study.axes if axis.name in at}
     return ", ".join(f"{known[k].name} {known[k].text_of(v) if is_number(v) else v}" for k, v in at.items())
+
+
+def meaning_of(study: Study, metric: str, units: Mapping[str, str]) -> str:
+    """What the outcome that cells count means, and by when; empty where an axis changes it.
+
+    As "settled by 8 s: largest position error, last third < 0.05 m"; of a `metric` of `BOOLEAN` by when it is true.
+    """
+    system = study.origin
+    if system.criterion.good is None or study.axes_of("stop_time") or study.axes_of("criterion.good"):
+        return ""
+    by = f"by {system.stop_time:g} s"
+    if metric in shares.BOOLEAN and metric != shares.GOOD:
+        return f"{metric} {by}"
+    return f"{system.criterion.outcomes[0]} {by}: {criterion_in_words(system, units)}"
 
 
 def _columns(store: Store, axes: Sequence[str]) -> tuple[dict[str, list[Any]], dict[str, Any]]:

@@ -83,7 +83,11 @@ class Style:
         """Put a text above all panels, in lines that fit the width; a paper has it as a caption, told by `save`."""
         figure.set_label(text)
         if self.has_titles:
-            figure.suptitle(textwrap.fill(text, max(20, round(self.width / (0.55 * self.font * POINT)))))
+            figure.suptitle(self.in_lines(text))
+
+    def in_lines(self, text: str) -> str:
+        """A text in lines that fit the width."""
+        return textwrap.fill(text, max(20, round(self.width / (0.55 * self.font * POINT))))
 
     @contextmanager
     def applied(self) -> Iterator[None]:

@@ -12,9 +12,11 @@ from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.basics.unit_algebra import after
 from orchestration.foundation.recording.recording import Chunk, Events, InMemory, Recording
+from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.own_points import Points, cut_at_points, on_lines, rows_at_points
 from orchestration.systems.expressions.over_run import Recorded, Spans, evaluate, expect_names, expect_number, vectors
 from orchestration.systems.expressions.syntax import Name, Node, Number, Operation, names, parse
+from orchestration.systems.expressions.syntax import text as text_of
 from orchestration.systems.system.model import DIVERGED, TERMINATED, System, expressions
 from orchestration.systems.system.request import Request, system_of
 
@@ -33,6 +35,15 @@ def how_runs_ended(outcomes: Mapping[str | None, int], total: int) -> str:
     counts = sorted(((count, name) for name, count in outcomes.items() if name), reverse=True)
     ended = ", ".join(f"{count} {name}" for count, name in counts)
     return f"{ended or 'no outcome'} of {total} runs"
+
+
+def undecided(system: System, outcomes: Mapping[str | None, int]) -> str:
+    """What to know if most of some runs are neither good nor diverged at their end; empty if few are, or none can."""
+    good, other = system.criterion.outcomes
+    count, total = outcomes.get(other, 0), sum(outcomes.values())
+    if system.criterion.diverged is None or 2 * count <= total:
+        return ""
+    return f"{count} of {total} runs are {other}, neither {good} nor {DIVERGED}: a longer stop_time may tell"
 
 
 def compute(
@@ -305,6 +316,11 @@ def bound_of(system: System, metric: str) -> float | None:
     return None
 
 
+def criterion_in_words(system: System, units: Mapping[str, str]) -> str:
+    """The condition by which a run is good, with the names and units of its objectives; `units` as in `unmet`."""
+    return " and ".join(_in_words(part, units) for part in _parts(parse(system.criterion.good or "")))
+
+
 def missed_objective(system: System, metrics: Mapping[str, Any]) -> str | None:
     """The first objective of which a run that did not diverge misses a bound; None: there is none."""
     if unmet(system, metrics, {}) is None or system.criterion.good is None:
@@ -332,6 +348,16 @@ def _parts(node: Node) -> Iterator[Node]:
             yield from _parts(right)
         case _:
             yield node
+
+
+def _in_words(part: Node, units: Mapping[str, str]) -> str:
+    match part:
+        case Operation(operation, (Name(name), Number(bound))) if operation in _HOLDS:
+            unit = units.get(name) or labels.METRICS.get(name, ("", None))[1]
+            return f"{labels.metric(name)} {operation} {labels.amount(bound, unit)}"
+        case Operation("or"):
+            return f"({text_of(part)})"
+    return text_of(part)
 
 
 def _missed(part: Node, metrics: Mapping[str, Any], units: Mapping[str, str]) -> str | None:

@@ -339,7 +339,11 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     drawn = main("draw", "study.toml", "--out", "figures", "--format", "png").stdout.splitlines()
     assert drawn == ["figures/good.png"]
     of_store = ("--store", "results/study/study.sqlite")
-    main("draw", "study.toml", *of_store, "--metric", "position_rmse", "--out", "figures", "--format", "png")
+    error = main("draw", "study.toml", *of_store, "--metric", "position_rmse", "--out", "medians", code=2).stderr
+    assert "8 of 8 runs are bounded, neither settled nor diverged" in error
+    assert "metric position_rmse: expected a settled run with a value of it" in error
+    assert "8 bounded of 8 runs by 0.05 s: try the shares" in error
+    assert not (tmp_path / "medians").exists(), "no empty picture"
     for command in ("export", "draw"):
         error = main(command, "study.toml", "--metric", "postion_rmse", code=2).stderr
         assert "did you mean position_rmse?" in error
@@ -355,7 +359,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert printed.splitlines()[-1] == "CascadedController,0.02,1,0,0.0,,,0.0,,,UnifiedController"
     of_diverged = pd.read_csv(tmp_path / "results/study/differences_diverged.csv")
     assert list(of_diverged)[3:] == ["difference", "low", "high"]
-    main("draw", "study.toml", "--metric", "diverged", "--out", "figures", "--format", "png")
+    main("draw", "study.toml", *of_store, "--metric", "diverged", "--out", "figures", "--format", "png")
     runs = pd.read_csv(tmp_path / "results/study/runs.csv")
     guids = {
         law: {quadcosim.read_model(fmu).description.guid for fmu in (law, f"native/{law}")}
@@ -376,6 +380,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     table = done.stdout.splitlines()
     assert table[0] == r"\begin{table*}  % needs \usepackage{booktabs}"
     assert r"of 1 in each cell, with 95 \% Wilson intervals; difference: CascadedController minus" in table[2]
+    assert "; settled by 0.05 s: largest position error, last third $<$ 0.05 m; " in table[2]
     assert table[5] == r"\shortstack[l]{{period} \\ {[ms]}} & UnifiedController & CascadedController & difference \\"
     assert table[7] == r"10 & 0.00 & 0.00 & 0.00 \\"
     with closing(sqlite3.connect(tmp_path / STORE)) as store, store:
@@ -409,6 +414,7 @@ def test_a_small_end_of_an_interval_keeps_its_sign() -> None:
     ends = pd.DataFrame({"share": [0.1, -1e-17], "low": [-0.0041, 0.0], "high": [0.256, 0.3]})
     assert study_table._texts(ends, "share", 2) == ["0.10 [-0.004, 0.26]", "0.00 [0.00, 0.30]"]
     assert with_interval(299 / 300, 0.98, 1.0, decimals_of(300)) == "0.997 [0.980, 1.000]"
+    assert with_interval(1 / 8, -3 / 8, 5 / 8, 2) == "0.13 [-0.38, 0.63]", "halves away from 0, not to even digits"
 
 
 def test_a_printed_table_has_nothing_that_tex_reads_otherwise() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from orchestration.quadrotor.scenarios.translation import quadrotor
-from orchestration.simulation.results.objectives import bound_of, unmet
+from orchestration.simulation.results.objectives import bound_of, criterion_in_words, undecided, unmet
 from orchestration.systems.system.model import System
 
 
@@ -54,3 +54,17 @@ def test_of_a_run_that_is_good_or_diverged_nothing_is_reported() -> None:
 def test_an_edge_is_the_bound_of_a_comparison_that_may_stand_beside_others_and_of_no_other_expression() -> None:
     assert bound_of(with_good("ultimate_bound < 0.05"), "ultimate_bound") == 0.05
     assert bound_of(with_good("ultimate_bound < 0.05 and settling_time < 5"), "settling_time") == 5.0
+
+
+def test_a_criterion_is_said_with_the_names_and_units_of_its_objectives() -> None:
+    system = with_good("ultimate_bound < 0.05 and (cost < 2 or settling_time + 1 < 3)")
+    said = "largest position error, last third < 0.05 m and ((cost < 2) or ((settling_time + 1) < 3))"
+    assert criterion_in_words(system, {}) == said
+
+
+def test_that_most_runs_are_neither_good_nor_diverged_is_said_where_runs_can_diverge() -> None:
+    said = "3 of 5 runs are bounded, neither settled nor diverged: a longer stop_time may tell"
+    assert undecided(quadrotor(), {"bounded": 3, "settled": 1, "diverged": 1}) == said
+    assert undecided(quadrotor(), {"bounded": 2, "settled": 2}) == ""
+    system = replace(quadrotor(), criterion=replace(quadrotor().criterion, diverged=None))
+    assert undecided(system, {"bounded": 5}) == ""
