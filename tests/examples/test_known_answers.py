@@ -23,7 +23,7 @@ from orchestration.systems.system.model import Criterion, System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.expect import expect, expected_of
 from orchestration.theory.exact.loops import Loops
-from quadcosim import bode, linearise
+from quadcosim import UsageError, bode, linearise
 from tests.examples.common import native_example as example
 from tests.extent import sample
 
@@ -162,6 +162,8 @@ def test_motor_under_a_cascade_of_two_rates_with_losses_has_the_moments_of_its_m
     found = expect(system, as_simulated=True)
     assert found.objectives["voltage"] == pytest.approx(mean_square_voltage(0.3, 0.4, 0.01), rel=1e-9)
     assert found.period == 0.001
+    with pytest.raises(UsageError, match="horizon: the initial state of controller, code of several rates, is not"):
+        expect(system, horizon=0.01, as_simulated=True)
 
 
 @pytest.mark.parametrize(

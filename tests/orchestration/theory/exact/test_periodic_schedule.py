@@ -245,6 +245,7 @@ def test_a_task_that_minds_how_long_its_step_is_has_to_sample_regularly() -> Non
         computer = Computer(tasks={"load": Task(period=0.004, execution=load)})
         system = on_a_computer("distributed_servo", computer, period=0.006, execution=0.001, priority=2)
         tasks = sampled_tasks(system, periodic_schedule(system))
+        assert tasks[0].numbers == (0, 1)
         if fits:
             expect_same_steps(system, tasks, parts)
         else:
