@@ -220,7 +220,10 @@ def test_the_command_writes_one_slave_of_a_folder_and_says_in_one_line_what_is_n
     assert_its_header_is_kept(tmp_path / "out" / "PidController.c")
     for asked, words in (
         ("Controller", f"Controller: expected {' or '.join(MODELS)}, a folder"),
-        ("examples/dc_servo/Pid", "examples/dc_servo/Pid: expected one of PidController, Servo in examples/dc_servo"),
+        (
+            "examples/dc_servo/Pid",
+            "examples/dc_servo/Pid: expected examples/dc_servo/PidController or examples/dc_servo/Servo, or ",
+        ),
     ):
         refused = main("export-c", asked, "--out", tmp_path, code=2)
         assert refused.stderr.startswith(f"quadcosim: {words}")

@@ -1,6 +1,7 @@
 """One controller, as `quadcosim new` writes it, flies every vehicle, every reference and every comparison unchanged."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -16,28 +17,15 @@ from orchestration.systems.system.request import errors_in_own_terms
 from quadcosim import FmuChoice, ReferenceChoice, Scenario, UsageError, load_vehicle
 from tests.commands import Main
 
-DEAF = '''"""Deaf: holds the origin, and has no input for anything else."""
-
-from mine import Mine
-from fmu_kit.algebra import ZERO
-from fmu_kit.interface import Input, Local
-
-
-class Deaf(Mine):
-    """PD that holds the origin by itself."""
-
-    target = Local("the origin", "m", ZERO)
-    target_velocity = Local("at rest", "m/s", ZERO)
-    target_acceleration = Local("at rest", "m/s2", ZERO)
-'''
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the controller, native and of the same law one that hears no reference."""
     folder = tmp_path_factory.mktemp("own")
     write("controller", "mine", folder, author="", license="")
-    (folder / "mine" / "deaf.py").write_text(DEAF)
+    law = (folder / "mine" / "mine.py").read_text()
+    deaf = re.sub(r"(target\w*) = Input.*", r"\1 = ZERO", law).replace("class Mine", "class Deaf")
+    (folder / "mine" / "deaf.py").write_text(deaf)
     return folder
 
 
