@@ -60,6 +60,7 @@ def test_a_study_is_run_inspected_and_exported(flown: Path, swept: tuple[Path, D
     answer = "6 bounded of 6 runs"
     assert swept[1].stdout == f"{answer}\n{STORE}: 6 runs, 6 of them new\n"
     told = [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line]  # or how far, if slow
+    assert told.pop(0).startswith("engine compiled: slow, as QuadrotorPlant, UnifiedController run Python; ")
     assert told == ["follows the trajectory that UnifiedController has built in"]
     assert main("status", "study.toml").stdout == f"{answer}\n{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
     exported = main("export", "study.toml").stdout.splitlines()
@@ -105,6 +106,7 @@ def test_failed_runs_are_reported_immediately_and_fail_the_command(folder: Path,
     told = done.stderr.splitlines()
     assert told.pop() == "follows the trajectory that UnifiedController has built in"
     assert told.pop(0).startswith("warning: the controller's nominal model is not the plant: ")
+    assert told.pop(0).startswith("engine compiled: slow")
     assert len(told) == 3
     assert told[0].startswith("run 1 (period = 0.02, delay = 0.0, plant.mass = 0.0) failed: plant.mass = 0.0: ")
     assert told[2].endswith("; further ones are not shown")

@@ -101,7 +101,7 @@ def test_a_run_whose_worker_is_killed_from_outside_stops_the_sweep_and_has_no_ro
             time.sleep(POLL)
         _, err = coordinator.communicate()
     assert coordinator.returncode == 1
-    assert len(err.splitlines()) == 1, err
+    assert [line.partition(":")[0] for line in err.splitlines()] == ["engine compiled", "quadcosim"], err
     assert rows_in(tmp_path / STORE) == 0
     monkeypatch.delenv(WAIT)
     monkeypatch.chdir(tmp_path)
@@ -136,7 +136,8 @@ def test_an_interrupt_is_reported_in_one_line_with_the_progress(
         os.kill(coordinator.pid if whom == "the coordinator" else workers_of(coordinator.pid)[0], signal.SIGINT)
         out, err = coordinator.communicate(timeout=PATIENCE)
     assert (coordinator.returncode, out) == (130, "")
-    assert err == f"quadcosim: interrupted with {rows_in(folder / STORE)} of {RUNS} runs done\n"
+    _, told = err.splitlines()  # the first says that Python is slow
+    assert told == f"quadcosim: interrupted with {rows_in(folder / STORE)} of {RUNS} runs done"
     assert all(row in reference for row in bits(folder / STORE))
 
 
