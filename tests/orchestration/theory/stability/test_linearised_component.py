@@ -231,6 +231,30 @@ def test_a_model_without_a_slow_integral_is_refused_by_the_response_to_a_held_in
         without.prove_held(1.0)
 
 
+class Limited(Differentiating):
+    """A law whose output has limits, about 0.7, which its integral reaches where the input is held."""
+
+    limit = 0.003
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.kept = np.array([0.7, 0.0, 0.7])
+
+    def step(self, t: float, h: float) -> None:
+        held, _, _ = self.kept
+        limited = float(np.clip(self.u + held, 0.7 - self.limit, 0.7 + self.limit))
+        self.kept = np.array([held + 0.04 * self.u, self.u, limited])
+
+
+def test_a_law_that_a_held_input_leads_to_its_limits_is_linear_about_rest() -> None:
+    fmu = Limited()
+    measured = tangent(fmu)
+    assert responses(measured, 3) == pytest.approx([1.0, 0.04, 0.04])
+    fmu.limit = 1e-9
+    with pytest.raises(UsageError, match="where y stays the same, as at a limit"):
+        measured.prove_held(1.0)
+
+
 class Growing(Line):
     """A law with states that grow and, hidden behind them, ones that decay; `offset` is what its states rest at."""
 
