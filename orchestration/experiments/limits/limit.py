@@ -196,15 +196,19 @@ def as_text(limit: Limit) -> dict[str, str]:
 
 
 def shares_as_text(limit: Limit) -> list[list[str]]:
-    """A table of the evaluated values whose share of good seeds is known, with its interval; empty without any."""
-    rows = [
-        [quantity(one.value, limit.unit, DIGITS), str(one.flew), f"{one.flew / one.runs:.2f} [{low:.2f}, {high:.2f}]"]
-        for one in limit.tried
-        if one.share is not None
-        for low, high in [one.share]
-    ]
-    if not rows or limit.confidence is None:
+    """A table of the evaluated values with their good seeds, and the share with its interval where all were run.
+
+    Empty where nothing is random.
+    """
+    if limit.confidence is None:
         return []
+    rows = []
+    for one in limit.tried:
+        good, share = f"{one.flew} of the first {one.runs}", "-"
+        if one.share is not None:
+            low, high = one.share
+            good, share = f"{one.flew}", f"{one.flew / one.runs:.2f} [{low:.2f}, {high:.2f}]"
+        rows.append([quantity(one.value, limit.unit, DIGITS), good, share])
     return [[limit.of, f"good of {limit.seeds}", f"share [{100.0 * limit.confidence:g} % Wilson interval]"], *rows]
 
 

@@ -12,6 +12,9 @@ from orchestration.foundation.basics.unit_algebra import quantity
 DIGITS = 6
 """Significant digits of a value in a sentence"""
 
+ROUNDING = 1e-9
+"""Share of a tolerance that is not a difference of two values, but rounding"""
+
 Fails = Callable[[float], bool]
 ReportRemaining = Callable[[int], None]
 """Called before each trial with the largest number of trials that can follow it."""
@@ -113,7 +116,7 @@ def first_failure(
         if good is None:
             return Bracket(None, value)
         low, step, bad = good, (value - good) / parts, value
-        if step >= tolerance:
+        if step >= (1.0 - ROUNDING) * tolerance:
             for i in range(1, parts):
                 finer = float(f"{low + i * step:.12g}")
                 remaining(parts - 1 - i + _halvings(step, tolerance))

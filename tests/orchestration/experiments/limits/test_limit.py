@@ -181,6 +181,17 @@ def test_steps_finer_than_the_tolerance_are_not_taken() -> None:
     assert tried == [1.0, 2.0, 1.5]
 
 
+def test_parts_that_are_narrower_than_the_tolerance_by_rounding_alone_are_scanned() -> None:
+    tried: list[float] = []
+
+    def fails(value: float) -> bool:
+        tried.append(value)
+        return value > 0.45
+
+    first_failure(fails, [0.3, 0.4, 0.5], 0.02, parts=5)
+    assert tried[:6] == [0.3, 0.4, 0.5, 0.42, 0.44, 0.46], "although (0.5 - 0.4)/5 < 0.02 in floating point"
+
+
 def test_nothing_above_the_first_value_that_fails_is_tried() -> None:
     tried = []
 
@@ -676,6 +687,8 @@ def test_the_value_at_which_nine_in_ten_is_refuted_is_noted_with_its_interval(
     heads, *rows = shares_as_text(found)
     assert heads == ["loss", "good of 29", "share [95 % Wilson interval]"]
     assert ["0.25", "29", "1.00 [0.88, 1.00]"] in rows
+    assert len(rows) == len(found.tried), "also the values at which only the first seeds were run"
+    assert ["0.265", "0 of the first 1", "-"] in rows
     assert as_text(found)["tried"] == f"{len(found.tried)} values"
     passed = {one.value: one for one in found.tried}[0.25]
     assert (passed.flew, passed.share) == (29, wilson(29, 29))
