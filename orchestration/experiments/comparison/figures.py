@@ -110,7 +110,11 @@ def shares(
         for name, those in curves.items():
             _shares_of(panel, axis, those, looks[name])
         runs = max((cell.count for cell in group), default=0)
-        panel.set_title(title if several else _joined(title, f"{runs} starts, 95 % intervals"))
+        if several:
+            panel.set_title(title)
+        else:
+            figure.set_label(_joined(title, f"{runs} starts, 95 % intervals"))
+            panel.set_title(str(figure.get_label()) if style.has_titles else "")
         panel.set_ylim(-0.02, 1.02)
         if not several:
             _name_curves(panel, axis, curves, colors, style)
@@ -160,8 +164,8 @@ def limits_of(reaches: Sequence[Reach], axis: Quantity, in_seconds: bool, style:
     panels[0].set(yticks=range(len(names)), yticklabels=names, ylim=(len(names) - 0.5, -0.5))
     titles = [f"survive up to\n{axis.title}", f"settle up to\n{axis.title}"]
     titles += [f"settle: {axis.name} · bandwidth\nof the attitude loop [rad]"] if in_seconds else []
-    for panel, title in zip(panels, titles):
-        panel.margins(x=0.15)  # room for arrows
+    for panel, title in zip(panels, titles):  # with room for arrows, and "below"
+        panel.margins(x=0.15 if all(limit.value for reach in reaches for limit in reach.limits) else 0.3)
         panel.set_xlabel(title)
     figure.legend(loc="outside upper center", ncols=2)
     return figure
@@ -318,8 +322,8 @@ def _bar(panel: Axes, limit: GridLimit, last: float, factor: float, at: float, c
     if not limit.value:  # not at the first value of the axis: no limit is known, and none is at 0
         panel.get_lines()[-3].set_visible(False)
         panel.annotate(
-            "below", (0.0, at), (2, 0), textcoords="offset points", color=color, va="center", fontsize="x-small",
-            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+            "below", (0.0, at), (-3, 0), textcoords="offset points", color=color, ha="right", va="center",
+            fontsize="x-small",
         )  # fmt: skip
     if limit.high is None:  # beside the last value, whose own mark stays visible
         panel.annotate(

@@ -1,7 +1,7 @@
 """Figures of cells: shares of good runs with their intervals, medians, and the difference between two laws."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from orchestration.experiments.studies.axes import SCALES, Axis, name_of, quantity_of
-from orchestration.experiments.studies.figures import mark_edge
+from orchestration.experiments.studies.figures import make_room, mark_edge
 from orchestration.experiments.studies.shares import (
     GOOD,
     WITH_VALUE,
@@ -43,8 +43,12 @@ MAX_TICKS = 12
 """Most ticks beside a panel"""
 MAX_PANELS = 9
 """Most values of a third axis of numbers: a map for each, three in a row"""
+ROW = 0.05
+"""Share of the height of a panel that a row of numbers takes"""
+BESIDE = 4.5
+"""Distance [pt] of a number, and of a sign with one, from the middle of a cell with a dot"""
 _NO_VALUE = "no value"
-OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{} • −"
+OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{}  •  −"
 """Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
 
 
@@ -61,7 +65,7 @@ def cell_lines(
     """The share of good runs, or the median of a metric, with its interval at 95 %, over one axis.
 
     `laws` is an axis of names, such as controllers: a line for each. Crosses at the lower edge are values without a
-    median.
+    median; the numbers of runs of medians stand at the upper edge, in a row for each line, where there is room.
     """
     across = quantity_of(axis, units)
     figure = style.figure(32.0)
@@ -72,7 +76,7 @@ def cell_lines(
     column = "share" if metric == GOOD else "median"
     groups = _by_value(shown, laws, units)
     lacking: dict[str | tuple[float, ...], Floats] = {}
-    lacks = []
+    lacks, numbers = [], {}
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
@@ -80,24 +84,24 @@ def cell_lines(
         if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
             ends = np.abs(group[["low", "high"]].to_numpy().T - group[column].to_numpy())
             panel.errorbar(at, group[column], ends, fmt="none", ecolor=how["color"], elinewidth=0.8, capsize=2.5)
-            known = group[group[WITH_VALUE] > 0]
-            for place, value, count in zip(across.of(known[axis.name]), known[column], known[WITH_VALUE]):
-                panel.annotate(
-                    f"{count}", (place, value), (3.0, -3.0), textcoords="offset points", va="top", fontsize="x-small",
-                    color=how["color"], path_effects=[withStroke(linewidth=1.5, foreground="white")],
-                )  # fmt: skip
+            counts = group.loc[group[WITH_VALUE] > 0, [axis.name, WITH_VALUE]].to_numpy()
+            numbers[how["color"]] = [*zip(across.of(counts[:, 0]), counts[:, 1].astype(int))]
             if len(without := group.loc[group[WITH_VALUE] == 0, axis.name]):
                 lacking[how["color"]] = across.of(without)
                 lacks.append(f"{f'by {law} ' if law else ''}at {', '.join(map(across.text_of, without))}")
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
+    most = max((len(f"{count}") for row in numbers.values() for _, count in row), default=0)
+    numbered = bool(most) and (most + 1) * found[axis.name].nunique() <= letters_of(style, 1)
     panel.set(
         xlabel=across.title,
-        ylabel=_title(metric, words, units, numbered=metric != GOOD, repeats=True),
+        ylabel=_title(metric, words, units, numbered=numbered, repeats=True),
         xscale=SCALES[axis.scale],
     )
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
+    if numbered:
+        _write_rows(panel, numbers)
     if lacking:
         mark_edge(panel, lacking, "x", low=True)
         panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
@@ -111,6 +115,18 @@ def cell_lines(
     said += [f"crosses: no {words[0]} run with a value {' and '.join(lacks)}"] if lacks else []
     style.set_title(figure, "; ".join(filter(None, said)))
     return figure
+
+
+def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, int]]]) -> None:
+    """Write numbers at their places along the upper edge, a row for each colour, above all marks."""
+    step = min(ROW, 0.4 / len(numbers))
+    make_room(panel, step * (len(numbers) + 0.5))
+    for row, (color, counts) in enumerate(numbers.items()):
+        for at, count in counts:
+            panel.text(
+                at, 1.0 - (row + 0.5) * step, f"{count}", color=color, ha="center", va="center", fontsize="x-small",
+                transform=panel.get_xaxis_transform(),
+            )  # fmt: skip
 
 
 def cell_maps(
@@ -331,6 +347,7 @@ def _difference(
     unknown = np.isnan(difference)
     mesh.hatch(panel, *places, unknown, mesh.NO_PAIRS)
     figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85)
+    aside = BESIDE if not is_share and writes else 2.5
     marks = (found["low"] > 0.0) | (found["high"] < 0.0)
     for row, is_marked in zip(found.to_dict("records"), marks):  # the sign, which colours do not show in grey
         if row["difference"]:
@@ -338,12 +355,12 @@ def _difference(
             x, y = (float(quantity.of(row[axis.name])) for axis, quantity in zip(axes, quantities))
             color = "white" if abs(row["difference"]) > HALF * size else BLACK
             panel.annotate(
-                "+" if row["difference"] > 0.0 else "−", (x, y), (0.0 if is_alone else 2.5, 0.0),
+                "+" if row["difference"] > 0.0 else "−", (x, y), (0.0 if is_alone else aside, 0.0),
                 textcoords="offset points", color=color, ha="center" if is_alone else "left", va="center",
                 fontsize="small",
             )  # fmt: skip
     if not is_share and writes:
-        _write_numbers(panel, quantities, axes, found.set_index(_names(*axes))["pairs"], 3.5)
+        _write_numbers(panel, quantities, axes, found.set_index(_names(*axes))["pairs"], BESIDE)
     marked = found[marks]
     if len(marked):
         places_of_dots = [quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes)]

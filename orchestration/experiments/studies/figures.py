@@ -87,16 +87,20 @@ def lines(
 def mark_edge(panel: Axes, places: Mapping[str | tuple[float, ...], Floats], mark: str, *, low: bool = False) -> None:
     """Marks along the upper edge, or the lower, in a row for each colour, beyond all other marks."""
     step = min(0.022, 0.25 / len(places))
-    share = step * (len(places) + 1)
+    make_room(panel, step * (len(places) + 1), low=low)
+    for row, (color, at) in enumerate(places.items(), start=1):
+        height = row * step if low else 1.0 - row * step
+        across = panel.get_xaxis_transform()
+        panel.plot(at, np.full(len(at), height), mark, color=color, markersize=4, transform=across)
+
+
+def make_room(panel: Axes, share: float, *, low: bool = False) -> None:
+    """Extend the axis up, or down, so that this share of its height is free."""
     scale = panel.yaxis.get_transform()
     bottom, top = (scale.transform(end) for end in panel.get_ylim())
     more = (top - bottom) * share / (1.0 - share)
     end = float(np.asarray(scale.inverted().transform(bottom - more if low else top + more)))
     panel.set_ylim(end if low else None, None if low else end)
-    for row, (color, at) in enumerate(places.items(), start=1):
-        height = row * step if low else 1.0 - row * step
-        across = panel.get_xaxis_transform()
-        panel.plot(at, np.full(len(at), height), mark, color=color, markersize=4, transform=across)
 
 
 def scatter(

@@ -87,7 +87,9 @@ def test_no_label_of_the_limits_is_cut_off_and_one_before_the_first_value_is_bel
         arrows = [patch for text in panel.texts if (patch := getattr(text, "arrow_patch", None)) is not None]
         assert arrows
         assert all(arrow.get_window_extent().x1 < figure.bbox.width for arrow in arrows)
-        assert "below" in [text.get_text() for text in panel.texts]
+        (below,) = (text.get_window_extent() for text in panel.texts if text.get_text() == "below")
+        bars = panel.transData.transform((0.0, 0.0))[0]
+        assert panel.bbox.x0 < below.x0 < below.x1 < bars, "beside the bar of its interval"
         marks = [line for line in panel.get_lines() if line.get_marker() == "o" and line.get_visible()]
         assert [np.asarray(line.get_xdata()).tolist() == [0.0] for line in marks] == [False]
 

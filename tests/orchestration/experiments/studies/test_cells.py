@@ -1,5 +1,7 @@
 """Cells of a study: shares of good runs with their intervals, laws side by side, their difference."""
 
+import itertools
+import math
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
@@ -151,6 +153,19 @@ def test_the_interval_of_a_difference_of_pairs_is_newcombes(
     assert found == pytest.approx(interval, abs=6e-5 if pairs[0] > 1 else 6e-4)
 
 
+def test_few_pairs_without_a_difference_have_a_dot_by_chance_as_often_as_the_page_says() -> None:
+    pairs, (both, only, neither) = 8, (0.0116, 0.4561, 0.0762)  # the worst probabilities of a pair for eight of them
+    chance = 0.0
+    for one, other, none in itertools.product(range(pairs + 1), repeat=3):
+        counts = (pairs - one - other - none, one, other, none)
+        if counts[0] >= 0:
+            shares = (share_of(counts[0] + each, pairs) for each in (one, other))
+            low, high = interval_of_difference(*shares, correlation=pair_correlation(*counts))
+            ways = math.factorial(pairs) / math.prod(map(math.factorial, counts))
+            chance += (low > 0.0 or high < 0.0) * ways * math.prod(map(pow, (both, only, only, neither), counts))
+    assert chance == pytest.approx(0.0856, abs=5e-5)
+
+
 def test_the_interval_of_a_difference_of_two_laws_is_newcombes_for_pairs() -> None:
     names, laws = ["controller", "timing.period", "timing.loss"], TwoLaws("controller", *map(str, LAWS.values or ()))
     place = ["timing.period", "timing.loss"]
@@ -300,7 +315,18 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
 
 def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     figure = cell_lines(runs(), LOSSES, LAWS, "position_rmse", WORDS, units={}, style=STYLES["paper"])
-    assert [text.get_text() for text in figure.axes[0].texts] == ["16", "16", "16", "3", "6"]
+    texts = figure.axes[0].texts
+    assert [text.get_text() for text in texts] == ["16", "16", "16", "3", "6"]
+    heights = [text.get_position()[1] for text in texts]
+    assert heights[0] == heights[2] > heights[3] == heights[4] > 0.9, "a row for each law, at the upper edge"
+    assert (
+        figure.axes[0].get_ylim()[1]
+        > 1.1 * medians_of(runs(), ["controller", "timing.loss"], "position_rmse")["high"].max()
+    )
+    many = runs().assign(**{"timing.loss": range(len(runs()))})
+    crowded = cell_lines(many, axis("timing.loss", *range(len(runs()))), LAWS, "position_rmse", WORDS, units={})
+    assert not crowded.axes[0].texts, "there is no room"
+    assert crowded.axes[0].get_ylabel().endswith("\nof the settled runs with a value")
     assert figure.axes[0].get_ylabel().endswith("\nnumber of settled runs with a value")
     assert crosses_of(figure) == [0.0], "none of the second law is good there"
     (legend,) = figure.legends
