@@ -17,6 +17,7 @@ from orchestration.experiments.studies.store import Store, open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS, metrics_with
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.terminal import inform
 from orchestration.foundation.recording import mat_file
 from orchestration.simulation.results.objectives import criterion_in_words
 from orchestration.simulation.runs.run_directory import MAT, load_run
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FORMATS = ("parquet", "csv", "mat")
+TABLES = ("runs", "shares", "shares_*", "medians_*", "differences", "differences_*")
+"""Patterns of the names of the files that `export` writes"""
 
 SHARED = (*TEXTS, "status", "machine", "engine")
 """Columns with few distinct texts"""
@@ -236,7 +239,19 @@ def of_study(
         _expect(kind, FORMATS)
     if metric is not None:
         expect_metric_of_cells(study, metric)
-    return export(store, out or store.parent, formats or FORMATS[:2], study, metric=metric)
+    written = export(store, out or store.parent, formats or FORMATS[:2], study, metric=metric)
+    if old := _older(written, store):
+        inform(
+            f"{', '.join(old)}: older than the store, of fewer runs or an earlier design; {written[0].parent} keeps "
+            "them until an export with their --format and --metric writes them again"
+        )
+    return written
+
+
+def _older(written: Sequence[Path], store: Path) -> list[str]:
+    """The names of tables of a study beside those that are `written` that are older than its store."""
+    found = {path for name in TABLES for kind in FORMATS for path in written[0].parent.glob(f"{name}.{kind}")}
+    return sorted(path.name for path in found - {*written} if path.stat().st_mtime < store.stat().st_mtime)
 
 
 def expect_metric_of_cells(study: Study | None, metric: str) -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import os
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
@@ -401,7 +402,11 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert list(differences) == ["law", "minus", "timing.period", "difference", "low", "high"]
     assert differences["minus"].tolist() == ["UnifiedController"] * 2
     assert differences[["low", "high"]].isna().all(axis=None)
+    old = tmp_path / "results/study/shares_diverged.csv"
+    assert "older than the store" not in main("export", "study.toml", "--format", "csv").stderr
+    os.utime(old, (0.0, 0.0))
     done = main("export", "study.toml", "--format", "csv", "--table", "latex")
+    assert "\nshares_diverged.csv: older than the store, of fewer runs or an earlier design" in f"\n{done.stderr}"
     assert str(STORE.with_name("runs.csv")) in done.stderr
     table = done.stdout.splitlines()
     assert table[0] == r"\begin{table*}  % needs \usepackage{booktabs}"
