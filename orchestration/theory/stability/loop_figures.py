@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import LogFormatter, MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.lines import label_time
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal
-from orchestration.simulation.results.quantities import setting
+from orchestration.simulation.results.quantities import Quantity, setting
 from orchestration.theory.stability.frequency import Bode, LoopMargins, critical_phase
 from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step_response import Step
@@ -23,14 +23,18 @@ SHOWN = 1.4
 """Largest part of a pole that is drawn"""
 NEAR, MOST = 2.0, 0.4
 """Half the width of the panel about 1, in distances of the slower half of the poles from it, and at most"""
-HIGHEST = 2.0
-"""Largest spectral radius that is drawn"""
+LINEAR = 2.0
+"""Largest spectral radius over which its axis is linear"""
+LOWEST = 0.1
+"""Least spectral radius that is drawn on an axis that is not"""
 LOWEST_PHASE = -720.0
 """Phase down to which it is drawn [°]: that of a long delay falls on and on"""
 ANGLES = (15.0, 30.0, 45.0, 90.0, 180.0)
 """Distances of ticks of a phase [°]: the least with which they are few"""
 ROWS = 3
-"""Rows of the labels of crossings, which stand in each in turn"""
+"""Rows of the labels of crossings, which stand in each in turn, above the curve"""
+ROW = 0.1
+"""Height of one, as a share of that of the curve"""
 EDGE = 0.25
 """Share of the width, from a side, in which a label has no room towards it"""
 LEAST = 1e-12
@@ -142,7 +146,11 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
 def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     """The poles beside the unit circle, shaded by the quantity, and the spectral radius over it; crosses leave it."""
     across = setting(result.of if "." in result.of else f"timing.{result.of}", result.values, result.unit)
-    figure = style.figure(54.0 if style.is_wide else 120.0)
+    known = result.poles[np.isfinite(result.poles)]
+    titles = ["×: where poles cross the circle"] * bool(result.crossings)
+    if outside := int((np.maximum(np.abs(known.real), np.abs(known.imag)) > SHOWN).sum()):
+        titles.append(f"not shown: {outside} of {len(known)} poles, up to |z| = {np.abs(known).max():.3g}")
+    figure = style.figure((50.0 + len(titles)) if style.is_wide else 120.0)
     rows = [["plane", "close"], ["over", "over"]] if style.is_wide else [["plane"], ["close"], ["over"]]
     panels: dict[str, Axes] = figure.subplot_mosaic(rows, height_ratios=[2.0] * (len(rows) - 1) + [1.0])
     plane, close, over = panels["plane"], panels["close"], panels["over"]
@@ -157,26 +165,38 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         dots = axes.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
         for one in result.crossings:
             axes.plot([one.z.real] * 2, [one.z.imag, -one.z.imag], "x", color=RED, linestyle="none")
-        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
-    half = min(MOST, NEAR * float(np.median(np.sort(np.abs(poles - 1.0))[: (len(poles) + 1) // 2])))
-    plane.set(
-        xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), title="×: where poles cross the circle" * bool(result.crossings)
-    )
+        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal", anchor="N")
+    apart = np.sort(np.abs(known - 1.0))
+    apart = apart[: (len(apart) + 1) // 2]
+    half = min(MOST, NEAR * float(np.median(apart))) or MOST if len(apart) else MOST
+    plane.set(xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), title="\n".join(titles))
     close.set(xlim=(1.0 - half, 1.0 + half), ylim=(-half, half), title="about z = 1")
     close.locator_params(nbins=5)
     figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
-    tried = across.of(result.curve[0])
-    over.plot(tried, result.curve[1], color=BLUE)
-    over.axhline(1.0, color=BLACK, linewidth=1.0)
-    for row, one in enumerate(result.crossings):
-        at = (float(across.of(one.value)), 1.0)
-        over.plot(*at, "x", color=RED)
-        left = at[0] > 0.5 * (tried[0] + tried[-1])
-        up = 5.0 + 10.0 * (row % ROWS) if left else -12.0 - 10.0 * (row % ROWS)
-        beside: dict[str, Any] = {"xytext": (-4.0 if left else 4.0, up), "ha": "right" if left else "left"}
-        over.annotate(across.text_of(one.value, 4), at, textcoords="offset points", **beside)
-    over.set(xlabel=across.title, ylabel="spectral radius", xlim=(tried[0], tried[-1]))
-    low, high = float(result.radius.min()), min(float(result.radius.max()), HIGHEST)
-    room = 0.05 * (max(high, 1.0) - min(low, 1.0))
-    over.set_ylim(min(low, 1.0) - room, max(high, 1.0) + room)
+    _draw_radius(over, result, across)
     return figure
+
+
+def _draw_radius(axes: Axes, result: RootLocus, across: Quantity) -> None:
+    """The spectral radius over the quantity; lines lead from where it is 1 to the values, in room above the curve."""
+    tried = across.of(result.curve[0])
+    axes.plot(tried, result.curve[1], color=BLUE)
+    axes.axhline(1.0, color=BLACK, linewidth=1.0)
+    axes.set(xlabel=across.title, ylabel="spectral radius", xlim=(tried[0], tried[-1]))
+    low, high = min(float(result.radius.min()), 1.0), max(float(result.radius.max()), 1.0)
+    if is_wide := high > LINEAR:
+        axes.set_yscale("log")
+        for formatted in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+            formatted(LogFormatter(minor_thresholds=(1.0, 0.5)))
+        low, high = math.log(max(low, LOWEST)), math.log(high)
+    rows, margin = min(ROWS, len(result.crossings)), 0.05 * (high - low)
+    top = high + margin + rows * ROW * (high - low)
+    places = np.array([low - margin, top, *(top - ROW * (high - low) * (np.arange(rows) + 0.9))])
+    lowest, highest, *texts = np.exp(places) if is_wide else places
+    axes.set_ylim(lowest, highest)
+    for k, one in enumerate(result.crossings):
+        at, left = float(across.of(one.value)), one.value > result.values[0] + (1.0 - EDGE) * np.ptp(result.values)
+        axes.plot([at, at], [1.0, texts[k % ROWS]], color=RED, linewidth=1.0, linestyle=":")
+        axes.plot(at, 1.0, "x", color=RED)
+        beside: dict[str, Any] = {"xytext": (-4.0 if left else 4.0, 0.0), "ha": "right" if left else "left"}
+        axes.annotate(across.text_of(one.value, 4), (at, texts[k % ROWS]), textcoords="offset points", **beside)

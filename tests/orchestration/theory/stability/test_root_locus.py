@@ -15,6 +15,7 @@ from orchestration.theory.stability import root_locus
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
+from orchestration.theory.stability.root_locus import Crossing, RootLocus
 from quadcosim import Timing, UsageError, bode, linearise, locus
 from tests.commands import Main
 from tests.examples.common import native_example as example
@@ -124,3 +125,23 @@ def test_periods_that_never_coincide_are_refused_with_values_that_do() -> None:
     several = dataclasses.replace(system, components={**system.components, "other": slow})
     with pytest.raises(UsageError, match=r"for 2 of 5 values .* as first 0\.004 last 0\.012 count 5"):
         locus(several, "components.controller.sampling.period", first=0.0021, last=0.0123, count=5)
+
+
+def test_a_wide_locus_has_its_labels_in_the_panel_and_says_how_many_poles_lie_beyond_another() -> None:
+    values, radius = np.array([0.0, 1.0, 50.0]), np.array([0.98, 1.0, 45.0])
+    crossings = [Crossing(value=x, until=x, leaves=True, z=1.0, frequency=0.0) for x in (0.27, 0.98, 1.02, 10.0, 49.5)]
+    found = RootLocus(
+        of="components.controller.parameters.gain", unit=None, values=values, radius=radius,
+        poles=radius[:, None].astype(complex), crossings=tuple(crossings), curve=np.array([values, radius]),
+    )  # fmt: skip
+    figure = found.plot()["locus"]
+    figure.canvas.draw()
+    over, plane = figure.axes[2], figure.axes[0]
+    assert over.get_yscale() == "log"
+    assert plane.get_title().endswith("not shown: 1 of 3 poles, up to |z| = 45")
+    labels = [text.get_window_extent() for text in over.texts]
+    assert len(labels) == len(crossings)
+    panel, curve = over.get_window_extent(), over.transData.transform((50.0, 45.0))[1]
+    for label in labels:
+        assert panel.x0 <= label.x0 < label.x1 <= panel.x1
+        assert curve <= label.y0 < label.y1 <= panel.y1 + 2.0
