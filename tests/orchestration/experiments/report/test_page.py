@@ -327,8 +327,8 @@ def test_a_second_study_is_drawn_over_the_first(of_study: Any, show: Show) -> No
     """The same study twice: the edges and shares of both are the same."""
     folder = Path(of_study.url.removeprefix("file://")).parent
     page = show(report(folder, folder, out=folder / "twice.html"))
-    assert " Over it study0: 4 runs: " in page.inner_text("#summary")
-    assert "dashed line: that of study0" in page.inner_text("#map-hint")
+    assert f" Over it {folder.name}: 4 runs: " in page.inner_text("#summary")
+    assert f"dashed line: that of {folder.name}" in page.inner_text("#map-hint")
     traces = "document.getElementById('map-plot').data"
     edge, other = page.evaluate(
         f"{traces}.filter((one) => one.mode === 'lines').map((one) => [one.x, one.y, one.line.dash])"
