@@ -66,7 +66,7 @@ def search_exactly(
     files = tuning.files()
     loops = Loops(files.models)
 
-    def expected(points: Sequence[Sequence[float]]) -> list[Expected]:
+    def expected(points: Sequence[Sequence[float]]) -> list[Expected | str]:
         systems = [tuning.system(period, tuning.values(shares)) for shares in points]
         with errors_in_own_terms(tuning.base):
             return isolated_call(files.fmus.values(), _expected, systems, loops)
@@ -74,29 +74,60 @@ def search_exactly(
     def costs(points: Sequence[Floats]) -> list[float]:
         return [_cost(each) for each in expected([point.tolist() for point in points])]
 
-    best = minimise(tuning, seed, keeping(costs), progress)
+    kept, tried = keeping(costs), list[tuple[Floats, float]]()
+
+    def refused() -> list[Floats]:
+        return [point for point, cost in tried if cost == math.inf]
+
+    def told() -> str:
+        """Why the first that has no expectation has none."""
+        first = refused()[0].tolist()
+        return f"{tuning.named(first)}: {expected([first])[0]}"
+
+    def noted(points: Sequence[Floats]) -> Sequence[float]:
+        values = kept(points)
+        tried.extend(zip(points, values))
+        if len(refused()) == len(tried):
+            raise UsageError(f"none of the first {len(tried)} candidates has an expectation, the first, {told()}")
+        return values
+
+    best = minimise(tuning, seed, noted, progress)
     (expectation,) = expected([best.shares.tolist()])
-    cost = expectation.objectives[COST]
+    assert isinstance(expectation, Expected)
+    cost, without = expectation.objectives[COST], len(refused())
     return ExactTuningResult(
         period=period,
         seed=seed,
         values=tuning.values(best.shares.tolist()),
         cost=math.inf if cost is None else cost,
         evaluations=best.evaluations,
+        note=f"{without} of {len(tried)} candidates had no expectation, the first, {told()}" if without else "",
         mean_square_radius=expectation.mean_square_radius,
         accuracy=expectation.accuracy,
     )
 
 
-def _expected(systems: Sequence[System], loops: Loops) -> list[Expected]:
-    """The expectations of each system, in order; raises `UsageError` if a cost has no expectation at all."""
-    results = [expected_of(system, loops) for system in systems]
-    for one in results:
-        if one.objectives[COST] is None and one.mean_square_radius < 1.0:
-            raise UsageError(one.reasons[COST])
-    return results
+def _expected(systems: Sequence[System], loops: Loops) -> list[Expected | str]:
+    """The expectations of each system, in order, or why it has none, as one that does not come to rest.
+
+    Raises `UsageError` if a cost has none whatever the parameters.
+    """
+    return [_expected_or_why(system, loops) for system in systems]
 
 
-def _cost(expected: Expected) -> float:
+def _expected_or_why(system: System, loops: Loops) -> Expected | str:
+    try:
+        found = expected_of(system, loops)
+    except UsageError as error:
+        return str(error)
+    if found.objectives[COST] is None and found.mean_square_radius < 1.0:
+        raise UsageError(found.reasons[COST])
+    return found
+
+
+def _cost(expected: Expected | str) -> float:
+    """Infinite without an expectation, which is worse than any that is unstable."""
+    if isinstance(expected, str):
+        return math.inf
     cost = expected.objectives[COST]
     return UNSTABLE * expected.mean_square_radius if cost is None else cost

@@ -189,6 +189,8 @@ def run_searches(
             record.add(one)
             done.append(one)
             announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
+            if one.note:
+                announce(one.note)
     return done
 
 

@@ -108,6 +108,10 @@ class TuningProblem:
             target: axis.at(float(share)) for axis, share in zip(self.parameters, shares) for target in axis.targets
         }
 
+    def named(self, shares: Sequence[float]) -> str:
+        """The parameters there by name, in words."""
+        return ", ".join(f"{axis.name} = {axis.at(float(share)):.4g}" for axis, share in zip(self.parameters, shares))
+
     def system(self, period: float, values: Mapping[str, float]) -> System:
         """The system with a period and values of the targets; raises `UsageError` for an invalid value."""
         changes = {path: value for target, value in values.items() for path in self._paths[target]}
@@ -128,6 +132,8 @@ class SearchResult:
     cost: float
     """Cost of these values, as minimised"""
     evaluations: int
+    note: str = ""
+    """What went wrong on the way, in one line; empty: nothing."""
 
     @property
     def judgement(self) -> str:

@@ -1,6 +1,7 @@
 """Tuning by exact expectations: against a separate search with matrices written by hand, and refusals."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,17 +10,26 @@ from scipy.optimize import minimize
 
 from orchestration.components.building import fmus
 from orchestration.experiments.studies.axes import Axis
+from orchestration.experiments.tuning import exact
 from orchestration.experiments.tuning.exact import ExactTuning, ExactTuningResult, search_exactly
 from orchestration.experiments.tuning.tune import Tuned, tune
 from orchestration.experiments.tuning.tuning_file import load_tuning
+from orchestration.experiments.tuning.tuning_problem import COST
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.model import System
+from orchestration.theory.exact.expect import Expected
+from orchestration.theory.exact.loops import Loops
+from orchestration.theory.stability.operating_point import NotAnEquilibriumError
 from tests.extent import in_test_all
 from tests.orchestration.theory.exact.common import servo
 from tests.places import EXAMPLES
 
 FILE = EXAMPLES / "distributed_servo" / "tuning.toml"
 GAINS = "components.controller.parameters"
+EXPECTED = Expected(
+    objectives={}, reasons={}, mean_square_radius=0.5, fourth_moment_radius=None, accuracy=0.0, method="", period=0.006
+)
 
 
 def tuning(**changes: object) -> ExactTuning:
@@ -67,6 +77,25 @@ def test_a_search_that_starts_where_no_cost_is_finite_reduces_the_radius() -> No
 def test_a_cost_without_an_expectation_is_refused_by_its_reason() -> None:
     with pytest.raises(UsageError, match=r"expected mean\(…\) or rms\(…\)"):
         search_exactly(tuning(cost="J + max(servo.angle)"), 0.006, 1, lambda _: None)
+
+
+def test_a_candidate_without_a_rest_is_passed_over_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    least = 0.0
+
+    def restless(system: System, loops: Loops) -> Expected:
+        if (K := system.components["controller"].parameters["K"]) > least:
+            raise NotAnEquilibriumError("the operating point is not at rest")
+        return replace(EXPECTED, objectives={COST: -K})
+
+    monkeypatch.setattr(exact, "expected_of", restless)
+    refusal = r"none of the first 6 candidates has an expectation, the first, K = [.\d]+, Td = [.\d]+: the operating "
+    with pytest.raises(UsageError, match=refusal):
+        tuned(tuning(evaluations=3), tmp_path)
+    least, told = 1.5, list[str]()
+    wide = replace(tuning(evaluations=9), name="wide")
+    (one,) = tune(wide, out=tmp_path, folder=tmp_path, progress=None, announce=told.append).searches
+    assert one.cost == -one.values[f"{GAINS}.K"] >= -least
+    assert re.fullmatch(r"\d+ of 18 candidates had no expectation, the first, K = .*: the operating .* rest", told[-1])
 
 
 @pytest.mark.parametrize(
