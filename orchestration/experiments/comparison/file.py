@@ -16,7 +16,7 @@ from orchestration.experiments.comparison.design import (
     over_second_axis,
 )
 from orchestration.experiments.studies.axes import Axis, Key, Value
-from orchestration.experiments.studies.study_file import OF_BASE, AxisTable, FileLike, axis_of, control_loop_of, load
+from orchestration.experiments.studies.study_file import AxisTable, FileLike, axis_of, control_loop_of, load
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError, no_such_key, prefixed
 from orchestration.foundation.basics.records import record
@@ -27,6 +27,11 @@ from orchestration.systems.system.component import parameters_in
 from orchestration.systems.system.request import ControlLoop
 from orchestration.systems.system.requirements import is_number
 from orchestration.systems.system.starts import Starts
+
+_OF_OTHERS = (
+    "controllers of other systems are compared by quadcosim sweep or draw, of a study with an axis over "
+    "components.NAME.fmu"
+)
 
 
 @record()
@@ -91,7 +96,10 @@ class ComparisonFile:
     """The path of the scenario file that all runs modify."""
     base: dict[str, Any] = field(default_factory=dict)
     """Instead of `scenario`, the tables of a scenario file."""
-    ELSEWHERE: ClassVar[Mapping[str, str]] = OF_BASE
+    ELSEWHERE: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("stop_time", "components", "system"),
+        'it is of a scenario of the quadrotor, which scenario = "FILE.toml" names here, or under [base]; ' + _OF_OTHERS,
+    )
 
 
 def load_comparison(comparison: Comparison | FileLike) -> Comparison:
@@ -105,7 +113,7 @@ def load_comparison(comparison: Comparison | FileLike) -> Comparison:
 
 def _comparison(file: ComparisonFile, path: Path) -> Comparison:
     folder = path.parent
-    base = control_loop_of(file, folder)
+    base = control_loop_of(file, folder, f"; {_OF_OTHERS}")
     axis, second = _axes(file)
     vehicles = _vehicles(file.vehicles, base, folder)
     keys = [(entry.name, value) for entry in vehicles for value in axis.values or ()]

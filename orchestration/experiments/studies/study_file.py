@@ -14,6 +14,7 @@ from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.typed_tables import parsed, table_of
 from orchestration.simulation.requests.request import load_request, request_from_tables
 from orchestration.systems.system.distribution import as_text
+from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.request import ControlLoop, Request, system_of
 
@@ -150,15 +151,17 @@ def base_of(file: HasBase, folder: Path) -> Request:
     return load_request(folder / file.scenario) if file.scenario else request_from_tables(file.base, folder)
 
 
-def control_loop_of(file: HasBase, folder: Path, otherwise: str = "") -> ControlLoop:
+def control_loop_of(file: HasBase, folder: Path, otherwise: str) -> ControlLoop:
     """Likewise for files that need initial conditions.
 
-    Raises `UsageError` for a system without known ones, which says what takes it `otherwise`.
+    Raises `UsageError` for a system without known ones, which says what takes it `otherwise`; also for one that stands
+    in the wrong place.
     """
-    base = base_of(file, folder)
+    named = next((name for key in ("system", "scenario") if isinstance(name := file.base.get(key), str)), "")
+    misplaced = load_request(folder / named) if (folder / named).is_file() else None
+    base = misplaced if isinstance(misplaced, System) else base_of(file, folder)
     if not isinstance(base, ControlLoop):
-        known = f"a scenario of the quadrotor, whose initial conditions are known{otherwise}"
-        raise UsageError(f"base: expected {known}; runs of any system, and costs of them, are for quadcosim sweep")
+        raise UsageError(f"base: expected a scenario of the quadrotor, whose initial conditions are known{otherwise}")
     return base
 
 

@@ -94,7 +94,8 @@ def _tuning(file: TuningFile, path: Path) -> Tuning | ExactTuning:
             if present:
                 raise UsageError(f'{key}: expected none with cost.by = "expect", which makes no runs')
         return ExactTuning(base=base_of(file, path.parent), **common)
-    base = control_loop_of(file, path.parent, ', or cost.by = "expect" for another system')
+    of_others = 'cost.by = "expect" for another system; runs of any system, and costs of them, are for quadcosim sweep'
+    base = control_loop_of(file, path.parent, f", or {of_others}")
     if file.cost.bad is None:
         raise UsageError("cost.bad: expected a value")
     starts = file.starts or StartsTable()

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ from orchestration.experiments.studies.run_key import design_parts
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import value_at
 from quadcosim import UsageError
-from tests.places import ROOT
+from tests.places import EXAMPLES, ROOT
 
 FILE = Path(__file__).with_name("test_design.toml").read_text(encoding="utf-8")
 CELLS = 2 * 2 * 2 * 3
@@ -182,6 +183,14 @@ def test_invalid_values_are_refused_in_one_line_with_the_file(before: str, after
     assert words in str(refused.value)
     assert str(refused.value).startswith(f"{file}: ")
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("key", ["system", "scenario"])
+@pytest.mark.parametrize("tables", [lambda one: one, lambda one: {"base": one}], ids=["beside", "base"])
+def test_another_system_is_referred_to_a_study_of_it_at_once_wherever_it_stands(tables: Any, key: str) -> None:
+    file = tables({key: str(EXAMPLES / "water_tank" / "system.toml")})
+    with pytest.raises(UsageError, match=r"of the quadrotor, .* other systems .* an axis over components\.NAME\.fmu$"):
+        load_comparison({**file, "controllers": [{"name": "a"}]})
 
 
 def test_a_cell_that_there_is_not_is_refused(comparison: Comparison) -> None:
