@@ -24,7 +24,11 @@ def new(
     in_c: Annotated[bool, option("--c", "A controller in C, and the file by which it is wrapped.")] = False,
     plant: Annotated[
         str | None,
-        option("--for", "A controller for this plant: its outputs in, its inputs out, connected.", "PLANT.fmu"),
+        option(
+            "--for",
+            "A controller for this plant: its outputs in, its inputs out, connected; also with --c.",
+            "PLANT.fmu",
+        ),
     ] = None,
     out: Annotated[Path, option("--out", "Folder in which it is written; default: this one.", "DIR")] = Path(),
 ) -> CommandResult:
@@ -40,7 +44,7 @@ def new(
     if in_c and kind != "controller":
         raise UsageError(f"new {kind} --c: expected controller; a plant with its law in C is in examples/dc_motor")
     author = git_author() if author is None else author
-    of_plant = None if plant is None else _of_plant(plant, kind, in_c, out / name)
+    of_plant = None if plant is None else _of_plant(plant, kind, out / name, in_c=in_c)
     written = write(kinds[kind], name, out, author=author, license=license, in_c=in_c, of_plant=of_plant)
     if not author:
         inform(
@@ -50,14 +54,14 @@ def new(
     return result_of_files(written)
 
 
-def _of_plant(plant: str, kind: str, in_c: bool, folder: Path) -> dict[str, str]:
+def _of_plant(plant: str, kind: str, folder: Path, *, in_c: bool) -> dict[str, str]:
     from orchestration.components.building import fmus
     from orchestration.components.fmi.read_description import read_model
     from orchestration.systems.system.for_plant import texts_for
 
-    if kind != "controller" or in_c:
-        raise UsageError(f"new {kind} --for {plant}: expected new controller, without --c")
-    return texts_for(plant, read_model(fmus.locate(plant, inform)), folder)
+    if kind != "controller":
+        raise UsageError(f"new {kind} --for {plant}: expected new controller")
+    return texts_for(plant, read_model(fmus.locate(plant, inform)), folder, in_c=in_c)
 
 
 def examples(

@@ -39,6 +39,8 @@ from orchestration.foundation.processes import subprocesses
 
 WHAT = "file of a controller in C"
 _DEGREES = re.compile("deg|°")
+NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
+"""The name of a variable"""
 REFUSED = 2
 """Exit code of the packer for code that cannot be wrapped as it is"""
 MOST_WARNINGS = 10
@@ -53,7 +55,7 @@ class WrappedVariable:
     c: str
     """The lvalue, as `in.x`, `rtU.speed`, `gains[2]`."""
     unit: str = "1"
-    """Its unit in SI."""
+    """Its unit in SI; "" for one that is not of SI, which nothing checks or converts."""
     description: str = ""
     """Description of the variable."""
     min: float | int | None = None
@@ -136,10 +138,10 @@ class WrapFile:
             if name in taken:
                 raise UsageError(f"{kind}.{name}: expected another name than one of the {taken[name]}")
             taken[name] = kind
-            if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", name, re.ASCII):
+            if not NAME.fullmatch(name):
                 raise UsageError(f"{kind}.{name}: expected a name of letters, digits and _, parts with dots between")
             try:
-                base_unit_exponents(variable.unit)
+                base_unit_exponents(variable.unit or "1")
             except ValueError as error:
                 inside = "after_parameters" if kind == "parameters" else "step"
                 hint = f"; degrees are rad here, and converted in {inside}" if _DEGREES.search(variable.unit) else ""
@@ -387,7 +389,7 @@ def description_of(path: Path) -> dict[str, Any]:
                 "name": name,
                 "causality": kind.removesuffix("s"),
                 "lvalue": code(variable.c, kind, name),
-                "unit": variable.unit,
+                "unit": variable.unit or None,
                 "description": variable.description,
                 "minimum": variable.min,
                 "maximum": variable.max,

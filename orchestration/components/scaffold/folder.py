@@ -38,6 +38,13 @@ _IN_C = {
     "system.toml": "{kind}_system.toml",
     "README.md": "c_{kind}_README.md",
 }
+_IN_C_FOR_A_PLANT = {
+    "{module}.c": "c_for_plant_law.c",
+    "{module}.h": "c_for_plant_law.h",
+    "{module}.toml": "c_for_plant_wrap.toml",
+    "system.toml": "for_plant_system.toml",
+    "README.md": "for_plant_README.md",
+}
 """Templates by the file that is written"""
 
 
@@ -53,7 +60,7 @@ def write(
 ) -> list[Path]:
     """Write the folder `where`/`name`; the paths of its files.
 
-    A controller may be `in_c`, or for a plant, of which the templates need texts: `of_plant`.
+    A controller may be `in_c`, and for a plant, of which the templates need texts: `of_plant`.
 
     The class has the name in CamelCase, its module in snake_case. Raises `UsageError` for an invalid name, or if the
     folder exists.
@@ -65,8 +72,10 @@ def write(
     expect_new(folder)
     names = {"Name": model, "module": module, "folder": name, "author": _quoted(author), "license": _quoted(license)}
     names |= {"guard": module.upper(), "fmu": f"{module}{WRAPPED}" if in_c else f"{model}.fmu"}
+    names |= {"source": f"{module}.{'c' if in_c else 'py'}"}
     names |= of_plant or {}
-    templates = _IN_C if in_c else _IN_PYTHON if of_plant is None else _FOR_A_PLANT
+    in_python, in_c_ = (_IN_PYTHON, _IN_C) if of_plant is None else (_FOR_A_PLANT, _IN_C_FOR_A_PLANT)
+    templates = in_c_ if in_c else in_python
     files = {key.format(module=module): value.format(kind=kind) for key, value in templates.items()}
     with new_files(where) as new:
         for file, template in files.items():

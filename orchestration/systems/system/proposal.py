@@ -125,9 +125,9 @@ def _resources(tables: Mapping[str, Any]) -> list[list[str]]:
 
     return [
         [
-            f"[{table}.{_key(name)}]",
+            f"[{table}.{key_of(name)}]",
             *tomli_w.dumps({key: value for key, value in one.items() if key != parts}).splitlines(),
-            *(f"{parts}.{_key(part)} = {_inline(keys)}" for part, keys in one[parts].items()),
+            *(f"{parts}.{key_of(part)} = {_inline(keys)}" for part, keys in one[parts].items()),
         ]
         for table, parts in (("computers", "tasks"), ("networks", "messages"))
         for name, one in tables.get(table, {}).items()
@@ -139,7 +139,8 @@ def _inline(keys: Mapping[str, Any]) -> str:
     return f"{{ {', '.join(pairs)} }}"
 
 
-def _key(name: str) -> str:
+def key_of(name: str) -> str:
+    """A name as a key, in quotes where it needs them."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
 
 
