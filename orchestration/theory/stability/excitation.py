@@ -303,8 +303,8 @@ class Excitation:
             rounding = tried[pulse][early]
         linear = {size: _linear(tried[size], max(NONLINEAR, LEAST * rounding)) for size in tried}
         best = max(linear, key=lambda size: linear[size])
-        pulse = best
-        while pulse <= PULSE and linear[pulse][0] == linear[best][0] < len(rungs) and 0.1 * pulse >= MIN_PULSE:
+        pulse = min(best, PULSE)
+        while linear[pulse][0] == linear[best][0] < len(rungs) and 0.1 * pulse >= MIN_PULSE:
             tried_before, pulse = pulse, 0.1 * pulse
             if pulse < LOST and not self._responds_alike(rungs[: linear[best][0] + 1], pulse, tried_before):
                 break

@@ -277,7 +277,8 @@ class Tangent(LinearSimulator):
         self._axes, chosen, self._back = found
         if ranks[-1] == min(len(columns), len(self._axes)):
             raise UsageError(
-                f"{excitation.name}: has more states than {len(ranks)} pulses and {len(ladder)} steps show"
+                f"{excitation.name}: has more states than {len(ranks)} pulses and {len(ladder)} steps show: expected "
+                "fewer, or a response that stays small and linear for longer, as with a shorter period"
             )
         self._produced = [produced[k] for k in chosen]
         self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))

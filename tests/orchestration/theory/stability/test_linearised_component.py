@@ -274,10 +274,14 @@ class Growing(Line):
         self.kept = self.offset + self.poles * (self.kept - self.offset) + self.u
 
 
-def test_poles_far_outside_the_unit_circle_hide_none_inside_it() -> None:
-    measured = tangent(Growing())
+@pytest.mark.parametrize("factor", [1.0, 1.3, 5.0])
+def test_poles_far_outside_the_unit_circle_hide_none_inside_it(factor: float) -> None:
+    """Neither where the first pulses tried are linear for as long as larger ones."""
+    fmu = Growing()
+    fmu.poles = Growing.poles * [factor, factor, 1.0, 1.0]
+    measured = tangent(fmu)
     found = np.linalg.eigvals(measured.derivatives(1.0)[0][1:])
-    assert np.sort(found.real) == pytest.approx(Growing.poles, rel=1e-3)
+    assert np.sort(found.real) == pytest.approx(fmu.poles, rel=1e-3)
     assert measured.accuracy < 1e-9
 
 
