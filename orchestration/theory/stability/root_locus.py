@@ -30,9 +30,10 @@ from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart
 from orchestration.theory.stability.fixed_periods import in_fixed_periods
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
-from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start, whole_at_rest
+from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, keep_start, whole_at_rest
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
+    NotAnEquilibriumError,
     beside_others,
     hyperperiod,
     hyperperiod_of,
@@ -157,7 +158,7 @@ def locus(
     jumps of a delay to a sampled component: both sides of each are tried. A period beside others crosses between two at
     which all coincide.
 
-    Raises `UsageError` for an invalid quantity or range, and as `linearise` where neither end of the range has poles.
+    Raises `UsageError` for an invalid quantity or range, and as `linearise` where no value has poles.
     """
     if not 2 <= count <= MAX_COUNT:
         raise UsageError(f"--count {count}: expected a number from 2 to {MAX_COUNT}")
@@ -198,38 +199,51 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
             if value in found:
                 return radius_of(value)
             try:
+                if starts:
+                    known.start = starts[min(starts, key=lambda one: abs(one - value))]
                 with whole_at_rest(at(value), instances, known=known) as loop:
                     found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
             except UsageError as error:
-                raise UsageError(f"{varied.of} = {value:g}: {error}") from None
+                raise type(error)(f"{varied.of} = {value:g}: {error}") from None
+            starts[value] = known.start
             return radius_of(value)
 
-        without = dict[float, str]()
+        starts, without = dict[float, Start | None](), dict[float, UsageError]()
 
-        def radius_if_any(value: float) -> float | None:
+        def has_poles(value: float) -> bool:
             try:
-                return radius(value)
+                radius(value)
             except UsageError as error:
-                without[value] = str(error)
-                return None
+                without[value] = error
+                return False
+            without.pop(value, None)
+            return True
 
         shortened, tried = _shortening(beside, unit), _beside_jumps(varied, system, values)
         crossings = list[Crossing]()
+
+        def cross(below: float, above: float) -> None:
+            if {below, above} <= found.keys() and (radius(below) < 1.0) != (radius(above) < 1.0):
+                ends = ((below, radius(below) - 1.0), (above, radius(above) - 1.0))
+                inside, outside = zero_between(lambda value: radius(value) - 1.0, shortened, *ends)
+                crossings.append(_crossing(inside, outside, *found[outside], leaves=radius(below) < 1.0))
+
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
-            high = radius_if_any(tried[-1])
-            if high is None:
-                if radius_if_any(tried[0]) is None:
-                    raise UsageError(without[tried[-1]])
-                del without[tried[-1]]  # near the rest that is known now it may have one
-                high = radius_if_any(tried[-1])
+            if not (
+                has_poles(tried[-1]) or has_poles(tried[0]) or isinstance(without[tried[0]], NotAnEquilibriumError)
+            ):
+                raise without[tried[-1]]
             for place in range(len(tried) - 2, -1, -1):
-                above, high = high, radius_if_any(tried[place])
+                has_poles(tried[place])
                 report(1.0 - place / len(tried))
-                if above is not None and high is not None and (high < 1.0) != (above < 1.0):
-                    ends = ((tried[place], high - 1.0), (tried[place + 1], above - 1.0))
-                    inside, outside = zero_between(lambda value: radius(value) - 1.0, shortened, *ends)
-                    crossings.insert(0, _crossing(inside, outside, *found[outside], leaves=high < 1.0))
+                cross(tried[place], tried[place + 1])
+            if not found:
+                raise without[tried[-1]]
+            for below, value, above in zip(tried, tried[1:], [*tried[2:], math.nan]):  # near a rest that is known now
+                if below in found and value in without and has_poles(value):
+                    cross(below, value)
+                    cross(value, above)
     refused, values = [value for value in values if value in without], [value for value in values if value in found]
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
@@ -238,9 +252,9 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
     curve = np.array([(x, radius_of(x) if x in found else math.nan) for x in sorted(found.keys() | without.keys())]).T
     return RootLocus(
         of=varied.of, unit=unit, values=np.array(values), radius=np.array([radius_of(value) for value in values]),
-        poles=poles, crossings=tuple(crossings), curve=curve,
+        poles=poles, crossings=tuple(sorted(crossings, key=lambda one: one.value)), curve=curve,
         in_double=are_in_double({name: one for name, (one, _, _) in known.items()}),
-        without=tuple(without[value] for value in refused),
+        without=tuple(str(without[value]) for value in refused),
     )  # fmt: skip
 
 

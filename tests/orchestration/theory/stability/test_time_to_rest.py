@@ -90,6 +90,13 @@ def test_gains_that_are_unstable_have_poles_at_a_rest_that_no_run_finds(servo: S
         locus(dataclasses.replace(servo, operating_point={"after": 0.01}), gain, first=0.96, last=4.0, count=2)
 
 
+def test_a_range_whose_ends_and_own_value_do_not_come_to_rest_begins_from_one_that_does(servo: System) -> None:
+    gain = "components.controller.parameters.K"
+    found = locus(changed(servo, {gain: 4.0}), gain, first=0.2, last=3.1, count=3)
+    given = locus(native_example("dc_servo"), gain, first=0.2, last=3.1, count=3)
+    assert found.radius == pytest.approx(given.radius, rel=1e-6)
+
+
 def test_a_law_that_begins_anew_settles_for_as_long_as_a_run_does(tmp_path: Path, servo: System) -> None:
     """Its command fades in over a second, by a state that no input moves; then its loop is that without."""
     code, command = (EXAMPLES / "dc_servo" / "controller.py").read_text(), "K * error + self.integral + self.derivative"
