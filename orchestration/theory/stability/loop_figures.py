@@ -150,7 +150,7 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     titles = ["×: where poles cross the circle"] * bool(result.crossings)
     if outside := int((np.maximum(np.abs(known.real), np.abs(known.imag)) > SHOWN).sum()):
         titles.append(f"not shown: {outside} of {len(known)} poles, up to |z| = {np.abs(known).max():.3g}")
-    figure = style.figure((50.0 + len(titles)) if style.is_wide else 120.0)
+    figure = style.figure((50.0 if style.is_wide else 90.0) + len(titles))
     rows = [["plane", "close"], ["over", "over"]] if style.is_wide else [["plane"], ["close"], ["over"]]
     panels: dict[str, Axes] = figure.subplot_mosaic(rows, height_ratios=[2.0] * (len(rows) - 1) + [1.0])
     plane, close, over = panels["plane"], panels["close"], panels["over"]
@@ -165,7 +165,7 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         dots = axes.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
         for one in result.crossings:
             axes.plot([one.z.real] * 2, [one.z.imag, -one.z.imag], "x", color=RED, linestyle="none")
-        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal", anchor="N")
+        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
     apart = np.sort(np.abs(known - 1.0))
     apart = apart[: (len(apart) + 1) // 2]
     half = min(MOST, NEAR * float(np.median(apart))) or MOST if len(apart) else MOST
