@@ -32,6 +32,7 @@ from orchestration.theory.exact.random_times import (
     exact_seconds,
 )
 from orchestration.theory.exact.timing import links_of, sampled_tasks
+from orchestration.theory.stability.matrices import OF_FIXED_STEP
 from orchestration.theory.stability.operating_point import hyperperiod
 
 Same = Callable[[Steps, Steps, Point], bool]
@@ -55,7 +56,7 @@ class LoopTimeline:
                 flown = [f"limit --of {each.path}, which flies it"] if each.kind == JITTER else []
                 raise UsageError(
                     f"{each.path}: samples of {each.name} depend on the time to the next one, which no proof covers: "
-                    f"expected {' or '.join([*sent, *flown])}"
+                    f"expected {', '.join([*sent, *flown])}, or {OF_FIXED_STEP}"
                 )
         self._lossy = next((each.name for each in varying if each.kind == LOSS), None)
         self._tasks, self._links = sampled_tasks(loop.system), links_of(loop.system)

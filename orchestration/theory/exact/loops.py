@@ -32,7 +32,7 @@ from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, Sam
 from orchestration.theory.exact.timing import by_turns, links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain, costs_until
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, whole_at_rest
-from orchestration.theory.stability.matrices import Components, Continuous, SampledSystem
+from orchestration.theory.stability.matrices import OF_FIXED_STEP, Components, Continuous, SampledSystem
 from orchestration.theory.stability.periodic_schedule import periodic_schedule
 from orchestration.theory.stability.scheduled import without_scheduler
 
@@ -285,14 +285,14 @@ def expect_same_steps(
         if not task.jitter.is_certain:
             raise UsageError(
                 f"components.{task.name}.sampling.jitter: the samples of {task.name} depend on the time to the "
-                "next one; expected none"
+                f"next one; expected none, or {OF_FIXED_STEP}"
             )
         step = _sampling(system, task.name).true_period / NANOSECONDS
         ends = [*task.offsets, *(task.period + offset for offset in task.offsets[:1] if repeating)]
         if any(then - now != step for now, then in itertools.pairwise(ends)):
             raise UsageError(
                 f"components.{task.name}: its samples depend on the time to the next one, which is not always "
-                f"{float(step):g} s; expected no other task or message to delay it"
+                f"{float(step):g} s; expected no other task or message to delay it, or {OF_FIXED_STEP}"
             )
 
 

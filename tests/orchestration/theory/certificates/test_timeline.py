@@ -212,6 +212,6 @@ def test_a_law_that_integrates_over_its_step_is_refused_with_late_samples(system
     assert not of.depends_on_step("controller")
     law: Any = of.components["controller"]
     integrates = {**of.components, "controller": dataclasses.replace(law, depends_on_step=True)}
-    advice = r"expected connections\.command\.delay_jitter or limit of components\.controller\.sampling\.jitter"
+    advice = r"expected connections\.command\.delay_jitter, limit of components\.controller\.sampling\.jitter, which"
     with pytest.raises(UsageError, match=f"samples of controller depend on the time to the next one.*{advice}"):
         LoopTimeline(dataclasses.replace(of, components=integrates), [SAMPLE])
