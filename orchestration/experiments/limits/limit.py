@@ -108,6 +108,7 @@ def limit(
         local = _by_theory("local", files, local_limits, varied, replace(span, also=failed))
         mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
     scheduled = sorted(trials.tried) if varied.system.computers or varied.system.networks else []
+    missed_from = _missed_from(varied, span, scheduled)
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
     note += _starved(varied, span, scheduled) if local.limit is None else []
     note += other_periods_in_words(varied.at(span.last), models)
@@ -120,7 +121,8 @@ def limit(
         local_accuracy=local.accuracy, local_lower_limit=local.lower, mean_square_limit=mean_square.limit,
         large_signal_limit=None if bracket is None else bracket.good,
         large_signal_lower_limit=None if lower is None else lower.good,
-        refuted_limit=refuted, missed_deadlines_from=_missed_from(varied, span, scheduled),
+        refuted_limit=refuted, missed_deadlines_from=missed_from,
+        missed_by=() if missed_from is None else tuple(schedule(varied.at(missed_from)).missed),
         follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
         scan=span.step, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
@@ -132,7 +134,7 @@ def limit(
 
 def _missed_from(varied: Varied, span: Range, values: Sequence[float]) -> float | None:
     """The lowest value, of some rising ones and to the tolerance, at which the schedule misses deadlines."""
-    bracket = first_failure(lambda value: schedule(varied.at(value)).misses_deadlines, values, span.tolerance)
+    bracket = first_failure(lambda value: bool(schedule(varied.at(value)).missed), values, span.tolerance)
     return None if bracket is None else bracket.bad
 
 
@@ -188,6 +190,8 @@ def as_text(limit: Limit) -> dict[str, str]:
         texts[name] = quantity(value, units.get(name), DIGITS) if isinstance(value, float) else str(value)
     if limit.flies_above:
         texts["flies_above"] = ", ".join(quantity(value, limit.unit, DIGITS) for value in limit.flies_above)
+    if limit.missed_by:
+        texts["missed_by"] = ", ".join(limit.missed_by)
     if (ideal := limit.continuous) is not None:
         settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
         texts["continuous"] = f"{ideal.outcome} at a period of {quantity(ideal.period, 's')}{settles}"

@@ -66,6 +66,8 @@ class Limit:
     confidence; None: nothing is random, or there is none in the range."""
     missed_deadlines_from: float | None = None
     """The lowest value, to the tolerance, at which tasks or messages miss deadlines; None: at no evaluated one."""
+    missed_by: tuple[str, ...] = ()
+    """The tasks and messages that miss them there."""
     follows: str = ""
     """The references and the components that follow them; empty if there are none."""
     horizon: float
@@ -112,7 +114,7 @@ class Limit:
         over = [one for one in failed if (low is None or one.value > low) and (good is None or one.value > good)][:1]
         again = f"; good again at {some(map(shown, self.flies_above))}" if self.flies_above else ""
         if self.missed_deadlines_from is not None:
-            again += f"; deadlines are missed already at {shown(self.missed_deadlines_from)}"
+            again += f"; deadlines of {some(self.missed_by)} are missed already at {shown(self.missed_deadlines_from)}"
         if over and good is None:
             begins = f"not good even at {shown(over[0].value)}, where the scan begins: {how(over[0])}"
             return f"{self.of} {begins}{again} ({resolution})"

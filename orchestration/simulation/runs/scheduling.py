@@ -45,9 +45,9 @@ class Scheduled:
     """All jobs and frames, in nanoseconds."""
 
     @property
-    def misses_deadlines(self) -> bool:
-        """Whether any task or message misses a deadline."""
-        return any(one.missed for one in (*self.tasks.values(), *self.messages.values()))
+    def missed(self) -> dict[str, float]:
+        """By task and message that misses deadlines, the share missed."""
+        return {name: one.missed for name, one in {**self.tasks, **self.messages}.items() if one.missed}
 
     @property
     def starved(self) -> list[str]:
@@ -59,12 +59,11 @@ class Scheduled:
     def verdict(self) -> str:
         """Which deadlines are missed, or how near the worst response comes to one, and what is busiest."""
         each = {**self.tasks, **self.messages}
-        missed = {name: one.missed for name, one in each.items() if one.missed}
         due = [name for name, one in each.items() if one.deadline is not None and one.missed is not None]
         busiest = max(self.busy, key=lambda name: self.busy[name], default=None)
         busy = "" if busiest is None else f"; {busiest} busy {100.0 * self.busy[busiest]:.3g} %"
         until = f"in {quantity(self.until, 's')}"
-        if missed:
+        if missed := self.missed:
             worst = [
                 f"{name} {100.0 * share:.3g} %" for name, share in sorted(missed.items(), key=lambda item: -item[1])
             ]

@@ -289,10 +289,13 @@ def expect_same_steps(
             )
         step = _sampling(system, task.name).true_period / NANOSECONDS
         ends = [*task.offsets, *(task.period + offset for offset in task.offsets[:1] if repeating)]
-        if any(then - now != step for now, then in itertools.pairwise(ends)):
+        steps = {then - now for now, then in itertools.pairwise(ends)}
+        if steps - {step}:
+            each = " to ".join(dict.fromkeys(f"{float(end):g}" for end in (min(steps), max(steps))))
             raise UsageError(
-                f"components.{task.name}: its samples depend on the time to the next one, which is not always "
-                f"{float(step):g} s; expected no other task or message to delay it, or {OF_FIXED_STEP}"
+                f"components.{task.name}: its samples depend on the time to the next one, which is {each} s, not its "
+                f"period of {float(step):g} s; expected no other task or message to delay it, no job skipped, "
+                f"or {OF_FIXED_STEP}"
             )
 
 

@@ -796,7 +796,7 @@ def test_find_runs_the_scenario_and_its_result_is_json() -> None:
     assert fields.keys() == {
         "of", "unit", "judged", "judged_unit", "judged_bound", "local_limit", "local_method", "local_accuracy",
         "local_limit_outside", "local_lower_limit", "mean_square_limit", "large_signal_limit",
-        "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from", "follows", "horizon",
+        "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from", "missed_by", "follows", "horizon",
         "tolerance", "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
     limit = found.large_signal_limit
