@@ -19,15 +19,17 @@ from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.systems.system.connection import variable_of
-from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.distribution import highest, lowest
 from orchestration.systems.system.files import files_of
+from orchestration.systems.system.model import System
+from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.placement import messages_by_connection, tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.certificates.breaking import LONGEST_SEQUENCE, BreakingSequence, breaking_at, least_breaking
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
 from orchestration.theory.certificates.certified_loop import DELAY, JITTER, LOSS, CertifiedLoop, Varying, certified_loop
 from orchestration.theory.certificates.family import LoopFamily
-from orchestration.theory.certificates.repeated import least_repeated
+from orchestration.theory.certificates.repeated import NOT_SEARCHED, least_repeated
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.theory.stability.in_double import are_in_double, of_code
@@ -62,6 +64,8 @@ class Certified:
     """The small-gain bound of Kao and Lincoln; None where it does not apply."""
     largest: float
     """The largest value that was considered."""
+    own: float | None = None
+    """The largest value of the system's own file [s]; None for losses."""
     beyond: str = ""
     """Why it is the largest; empty: it is `last`."""
     not_sought: str = ""
@@ -87,8 +91,14 @@ class Certified:
         proved = f"no proof sought: {self.not_sought}" if self.not_sought else "no proof found"
         if self.certified is not None:
             proved = f"every sequence up to {shown(self.certified)} is stable"
+            if self.own is not None and self.certified < self.own:
+                proved += f", less than the file's {shown(self.own)}, for which nothing is proved"
+                if self.breaking is None or self.own < self.breaking:
+                    proved += " (no sign that it is unstable)"
         beyond = f" ({self.beyond})" if self.beyond else ""
         broken = f"none found up to {shown(self.largest)}, the most that is tried{beyond}, that breaks the loop"
+        if self.searched == NOT_SEARCHED:
+            broken = "none sought that breaks the loop"
         if self.breaking is not None:
             broken = f"one of {shown(self.breaking)} breaks the loop"
         best = ""
@@ -143,7 +153,13 @@ def margin(request: RequestLike, of: str, *, last: float | None = None, progress
             found = replace(_of_losses(timeline, varying, int(most), report), beyond=beyond)
         else:
             found = _of_times(timeline, varying, last, report)
-    return replace(found, in_double=are_in_double(loop.system.components))
+    own = None if varying.kind == LOSS else highest_at(system_of(request), varying.path)
+    return replace(found, own=own, in_double=are_in_double(loop.system.components))
+
+
+def highest_at(system: System, path: str) -> float:
+    """The largest value of the time at a path [s]."""
+    return float(highest(value_at(system, path) or 0.0))
 
 
 def linear_loop_of(request: Request) -> CertifiedLoop:
@@ -262,13 +278,14 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Sh
             break
         families.append(family)
     value, certificate, not_sought = None, None, not_sought_for(timeline.family(run=most))
-    stable = [] if not_sought else [*enumerate(families if broken is None else families[: int(broken.value)])]
-    for run, family in reversed(stable):  # a proof for a run is one for all shorter ones
-        progress(1.0 - 0.5 * (run + 1) / (most + 1))
-        found = find_certificate(family, [varying.path])
-        if found is not None:
-            value, certificate = run, found.certificate.to_json()
+    stable = [] if not_sought else families if broken is None else families[: int(broken.value)]
+    step = 0
+    for run, family in enumerate(stable):  # a proof for a run is one for all shorter ones, and failing takes longest
+        progress(0.5 + 0.5 * run / len(stable))
+        found = find_certificate(family, [varying.path], step)
+        if found is None:
             break
+        value, certificate, step = run, found.certificate.to_json(), found.step
     return Certified(
         of=varying.path, certified=value, breaking=None if broken is None else broken.value,
         breaking_sequence=() if broken is None else broken.sequence, largest=most,
@@ -290,12 +307,14 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
         search = isolated_call(files.fmus.values(), least_repeated, system, cause, files.models, loop.period)
     largest = scheduled.largest()
     top = largest if search.breaking is None else min(largest, search.breaking)
+    tried = largest if search.last is None else search.last
     value, certificate, not_sought = None, None, not_sought_for(scheduled.family(0.0))
     if search.breaking != 0.0 and not not_sought:
         value, certificate = largest_certified(scheduled.family, [cause.path], top, progress)
     return Certified(
         of=cause.path, certified=value, breaking=search.breaking,
-        breaking_sequence=search.sequence, largest=largest, searched=search.searched,
+        breaking_sequence=search.sequence, searched=search.searched,
+        largest=tried if search.breaking is None else largest, own=highest_at(system, cause.path),
         states=len(scheduled.family(0.0).kept), certificate=certificate, not_sought=not_sought,
         in_double=are_in_double(loop.system.components),
     )  # fmt: skip

@@ -13,6 +13,7 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.foundation.processes.passable import passable
 from orchestration.systems.system.computers import Task
 from orchestration.systems.system.distribution import highest
@@ -31,6 +32,8 @@ MAX_TURNS = 4
 MAX_SEQUENCE_JOBS = 64
 """Most jobs after which a sequence repeats"""
 
+NOT_SEARCHED = "no sequences"
+
 Word = tuple[int, ...]
 """Choices by turn, 0 or 1: nothing, or the value"""
 
@@ -45,6 +48,8 @@ class RepeatedSearch:
     sequence: tuple[tuple[str, tuple[float, ...]], ...] = ()
     """numbers of jobs, with their value"""
     searched: str
+    last: float | None = None
+    """the largest value that was tried [s]; None: none was"""
 
 
 def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], period: Fraction) -> RepeatedSearch:
@@ -55,7 +60,7 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
     """
     of = next((each for each in placed_tasks(system.computers) if cause.path.startswith(f"{each.place}.")), None)
     if of is None or of.task.period is None or (of.task.component is not None and cause.key != EXECUTION):
-        return RepeatedSearch(searched="no sequences")
+        return RepeatedSearch(searched=NOT_SEARCHED)
     loops, always = Loops(models), _with_longest_jobs(system)
     jobs = math.ceil(period / NANOSECONDS / Fraction(repr(float(cause.period))))
     longest = 1 if of.task.component is not None else max(1, min(MAX_TURNS, MAX_SEQUENCE_JOBS // jobs))
@@ -80,17 +85,19 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
         if worst is not None or len(unknown) == len(words):
             break
         good = value
-    searched = (
-        f"0 and a value up to {value:g} s, in sequences that repeat after at most {longest} times {jobs} jobs, "
-        "as far as a timetable repeats"
-    )
+    turns = f"in turns of {jobs} jobs, each 0 or the value, that repeat after at most {longest} turns"
+    searched = f"{turns if longest > 1 else 'the same value for all jobs'}: "
+    searched += f"values from 0 to {quantity(good if worst is None else value, 's')} in steps of "
+    searched += quantity(cause.period / SCAN, "s")
     if len(unknown) == len(words):
-        searched += f": {unknown[words[0]]}"
+        searched += f"; at {quantity(value, 's')} {unknown[words[0]]}"
+    elif unknown:
+        searched += f"; without {len(unknown)} of {len(words)} whose schedule does not repeat"
     if worst is None:
-        return RepeatedSearch(searched=searched)
+        return RepeatedSearch(searched=searched, last=good)
     least = bisected(lambda x: fails(x, worst), good, value, FINE * cause.period).bad
     sequence = tuple((f"{jobs} jobs" if jobs > 1 else "job", (least * share,)) for share in worst)
-    return RepeatedSearch(breaking=least, sequence=sequence, searched=searched)
+    return RepeatedSearch(breaking=least, sequence=sequence, searched=searched, last=least)
 
 
 def _with_longest_jobs(system: System) -> System:

@@ -184,6 +184,9 @@ def test_a_sequence_that_breaks_a_loop_does_so_where_it_is_a_trace(tmp_path: Pat
     assert cause is not None
     tried = least_repeated(slow, cause, files_of(slow).models, Fraction(1_800_000_000))
     turns = [value for _, (value,) in tried.sequence]
+    assert tried.searched.startswith(
+        "in turns of 2 jobs, each 0 or the value, that repeat after at most 4 turns: values from 0 to "
+    )
     assert turns == [tried.breaking] * 3 + [0.0]
     good = []
     for share in (0.99, 1.01):
@@ -206,6 +209,7 @@ def test_of_frames_before_the_command_the_jitter_is_certified(monkeypatch: pytes
     monkeypatch.setattr(certificates, "SHARES", (0.5,))
     found = margin(on_a_bus(), "networks.bus.messages.status.jitter")
     assert (found.certified, found.breaking, found.searched) == (0.5 * found.largest, None, "no sequences")
+    assert "none sought that breaks the loop" in found.verdict
     up_to = check_certificate(found.save(tmp_path / "certificate.json"), on_a_bus()).up_to
     assert up_to is not None
     assert found.certified <= up_to < found.largest  # as no other value would make the command later

@@ -167,6 +167,15 @@ def test_a_small_gain_bound_beyond_what_is_certified_is_in_the_verdict() -> None
     assert "small-gain" not in replace(found, small_gain=0.009).verdict
 
 
+def test_a_value_of_the_file_beyond_what_is_certified_is_in_the_verdict() -> None:
+    found = Certified(of=COMMAND, certified=0.001, largest=0.01, searched="", states=5, own=0.0012)
+    less = "every sequence up to 1 ms is stable, less than the file's 1.2 ms, for which nothing is proved"
+    assert f"{less} (no sign that it is unstable), none found" in found.verdict
+    assert f"{less}, one of 1.1 ms breaks the loop" in replace(found, breaking=0.0011).verdict
+    assert "the file's" not in replace(found, own=0.001).verdict
+    assert certificates.highest_at(changed(example("double_integrator"), {COMMAND: 0.002}), COMMAND) == 0.002
+
+
 def test_a_loop_that_is_unstable_by_itself_has_no_margin(system: System) -> None:
     slow = changed(system, {"components.controller.sampling.period": 2.1})
     for path in (COMMAND, LOST):
