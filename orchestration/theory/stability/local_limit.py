@@ -231,14 +231,15 @@ def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimi
     tried, growth = dict[float, float](), _naming_values(growth, span)
 
     def grows(value: float) -> bool:
-        tried[value] = growth(value)
+        if value not in tried:
+            tried[value] = growth(value)
         return tried[value] > 0.0
 
     ends = ends_of_good(grows, rates.scan, span.own, span.last)
     for value in rates.scan:  # beyond, where a loop that is unstable need not come to rest
         with suppress(UsageError):
-            _ = value in tried or grows(value)
-    lower, upper = (None if end is None or end.good is None else _narrowed(growth, end, rates.fine) for end in ends)
+            grows(value)
+    lower, upper = (None if end is None or end.good is None else _narrowed(grows, end, rates) for end in ends)
     runs = [
         [value for value, _ in run]
         for is_bad, run in groupby(sorted(tried.items()), key=lambda one: one[1] > 0.0)
@@ -268,18 +269,34 @@ def _middle(bracket: Bracket | None) -> float | None:
     return None if bracket is None or bracket.good is None else 0.5 * (bracket.good + bracket.bad)
 
 
-def _narrowed(growth: Growth, bracket: Bracket, fine: list[float]) -> Bracket:
-    """The bracket bisected by the values of `fine` within it."""
+def _narrowed(grows: Callable[[float], bool], bracket: Bracket, rates: Commensurate) -> Bracket:
+    """The bracket bisected by the values of `fine` within it, until that before its good end is good, too.
+
+    Between values at which it is unstable, a loop may be stable at one, as at a multiple of another period.
+    """
     good, bad = bracket
     assert good is not None
-    between = sorted((x for x in fine if min(good, bad) < x < max(good, bad)), reverse=bad < good)
-    while between:
-        half = len(between) // 2
-        if growth(between[half]) > 0.0:
-            bad, between = between[half], between[:half]
-        else:
-            good, between = between[half], between[half + 1 :]
-    return Bracket(good, bad)
+    down = bad < good
+    fine, scan = (sorted(values, reverse=down) for values in (rates.fine, rates.scan))
+
+    def before(values: list[float], end: float) -> list[float]:
+        return [x for x in values if (x > end if down else x < end)]
+
+    while True:
+        between = [x for x in before(fine, bad) if before([good], x)]
+        while between:
+            half = len(between) // 2
+            if grows(between[half]):
+                bad, between = between[half], between[:half]
+            else:
+                good, between = between[half], between[half + 1 :]
+        beside = before(fine, good)[-1:]
+        if not beside or not grows(beside[0]):
+            return Bracket(good, bad)
+        stable = next((x for x in reversed(before(scan, beside[0])) if not grows(x)), None)
+        if stable is None:
+            return Bracket(good, bad)
+        good, bad = stable, beside[0]
 
 
 def _first_growth(growth: Growth, span: Range, method: str, finer: float | None) -> LinearLimit:
