@@ -121,15 +121,16 @@ def _painted(record: logging.LogRecord) -> str:
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Share]:
-    """A progress bar on a terminal that can draw it; else occasional lines."""
+def progress_bar(what: str, *, steady: bool = True) -> Iterator[Share]:
+    """A progress bar on a terminal that can draw it; else occasional lines. `steady`: the rate tells the time left."""
     if not _draws():
         report, left = _occasional_lines(), _TimeLeft()
-        yield lambda share: report(f"{what}: {share:.0%}", left.after(share))
+        yield lambda share: report(f"{what}: {share:.0%}", left.after(share) if steady else "")
         return
     from rich.progress import Progress
 
-    with Progress(console=_console(), transient=True) as bar:
+    columns = Progress.get_default_columns()
+    with Progress(*(columns if steady else columns[:-1]), console=_console(), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
         _BARS.append(lambda text: bar.update(task, description=text or what))
         try:
@@ -273,9 +274,9 @@ CountProgress: TypeAlias = Count | Literal["bar"] | None
 """Likewise, but a function is called with the number of runs done and the total"""
 
 
-def share_reporter(progress: ShareProgress, what: str) -> AbstractContextManager[Share]:
-    """The function to call with the share of the work done."""
-    return _reporter(progress, lambda: progress_bar(what), lambda share: None)
+def share_reporter(progress: ShareProgress, what: str, *, steady: bool = True) -> AbstractContextManager[Share]:
+    """The function to call with the share of the work done; `steady` as above."""
+    return _reporter(progress, lambda: progress_bar(what, steady=steady), lambda share: None)
 
 
 def runs_reporter(progress: CountProgress) -> AbstractContextManager[Count]:

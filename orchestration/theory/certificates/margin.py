@@ -138,7 +138,7 @@ def margin(request: RequestLike, of: str, *, last: float | None = None, progress
             raise UsageError(
                 f"--to {last:g}: expected none for {of}, of which all values that have a proof are considered"
             )
-        with share_reporter(progress, "certifying") as report:
+        with share_reporter(progress, "certifying", steady=False) as report:
             return _of_cause(request, cause, report)
     varying = varying_of(request, of)
     expect_without_scheduler(request)
@@ -147,7 +147,7 @@ def margin(request: RequestLike, of: str, *, last: float | None = None, progress
         raise UsageError(f"--to {most:g}: expected a number of losses in a row, from 1 to {MOST_LOST_GIVEN}")
     loop = linear_loop_of(request)
     timeline = LoopTimeline(loop, [varying])
-    with share_reporter(progress, "certifying") as report:
+    with share_reporter(progress, "certifying", steady=False) as report:
         if varying.kind == LOSS:
             beyond = "--to tries more" if last is None else ""
             found = replace(_of_losses(timeline, varying, int(most), report), beyond=beyond)

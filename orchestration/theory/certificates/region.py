@@ -109,7 +109,7 @@ def margin_region(
     if too_large := margin.not_sought_for(timeline.family([0.0, 0.0])):
         raise UsageError(f"no proof is sought: {too_large}")
     paths = (pair[0].path, pair[1].path)
-    with share_reporter(progress, "certifying") as report:
+    with share_reporter(progress, "certifying", steady=False) as report:
         widest = _least_breaking(timeline, 0.0, first=True)
         most = floor_to_nanoseconds(timeline.largest()) if widest is None else widest.value
         certified, breaking, texts = list[Pair](), list[Pair](), list[str]()

@@ -28,18 +28,19 @@ def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
     return passes
 
 
-@pytest.mark.parametrize("kind", ["pipe", "dumb terminal"])
+@pytest.mark.parametrize(("kind", "steady"), [("pipe", True), ("dumb terminal", True), ("pipe", False)])
 def test_where_no_bar_can_be_drawn_occasional_lines_show_the_time_left(
-    kind: str, wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch
+    kind: str, steady: bool, wait: Callable[[float], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     output = io.StringIO() if kind == "pipe" else Terminal()
     monkeypatch.setattr(sys, "stderr", output)
     monkeypatch.setenv("TERM", "dumb")
-    with progress_bar("flying") as progress:
+    with progress_bar("flying", steady=steady) as progress:
         for percent in range(101):
             wait(SPARSE / 40)
             progress(percent / 100)
-    assert output.getvalue().splitlines() == ["flying: 39%, 16 s left", "flying: 79%, 5 s left"]
+    left = (", 16 s left", ", 5 s left") if steady else ("", "")
+    assert output.getvalue().splitlines() == [f"flying: 39%{left[0]}", f"flying: 79%{left[1]}"]
 
 
 def test_occasional_lines_count_runs_too(
