@@ -133,7 +133,7 @@ class SearchResult:
     """Cost of these values, as minimised"""
     evaluations: int
     note: str = ""
-    """What went wrong on the way, in one line; empty: nothing."""
+    """Failures of candidates on the way, in one line; empty: none"""
 
     @property
     def judgement(self) -> str:
