@@ -26,7 +26,7 @@ NEGLIGIBLE = 1e-12
 """Share of the state between samples of several rates that counts as rounding"""
 TERMS = 24
 OF_FIXED_STEP = "a law with a parameter for its period in place of the step"
-"""What is expected where samples must not depend on the time to the next one"""
+"""Law expected where samples must not depend on the time to the next one"""
 INDEPENDENT = (0.1, 1e-3, 1e-5, 1e-8)
 """relative part of a coordinate outside of the span of those before it, at least; tried in turn"""
 
