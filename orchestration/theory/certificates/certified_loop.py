@@ -75,8 +75,9 @@ def certified_loop(rest: AtRest) -> CertifiedLoop:
             matrices = in_continuous_time(tangent, min(component.step, period))
             if matrices.unfit is not None:
                 raise UsageError(
-                    f"{name}: {matrices.unfit}, so it is no linear system in continuous time: expected a lower "
-                    "step, or a component that integrates more accurately, as by more internal steps or a higher order"
+                    f"{name}: {matrices.unfit}, so it is no linear system in continuous time, or rounding hides that "
+                    "it is: expected another step, or a component that integrates more accurately, as by more "
+                    "internal steps or a higher order"
                 )
             components[name] = in_output_coordinates(matrices, expm(matrices.A * period))
     for x in system.connections:

@@ -143,8 +143,9 @@ class Loops:
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
-                    f"{name} is no linear system in continuous time: {part.unfit}; expected --as-simulated, or a "
-                    "component with more internal steps, or a method of higher order"
+                    f"{name} is no linear system in continuous time, or rounding hides that it is: {part.unfit}; "
+                    "expected --as-simulated of expect, or a component with more internal steps, or a method of "
+                    "higher order"
                 )
         return Linear(
             parts=parts, methods=methods, accuracy=accuracy, precision=precision, objectives=objectives, noise=noise,

@@ -117,7 +117,8 @@ class RootLocus:
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
-            return f"{self.of}: poles {begins} the unit circle from {first} to {last}, {radii} {known}"
+            many = f"{len(self.values)} values from {first} to {last}"
+            return f"{self.of}: poles {begins} the unit circle at each of {many}, {radii} {known}"
         ways = [f"{'leave' if one.leaves else 'return'} {self.place_of(one)}" for one in self.crossings]
         return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} {known}"
 

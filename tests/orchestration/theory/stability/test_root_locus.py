@@ -33,6 +33,8 @@ def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_mar
         f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations)"
     )
     servo = example("dc_servo")
+    below = locus(servo, DELAY, first=0.0, last=0.01, count=2).verdict
+    assert below.startswith(f"{DELAY}: poles inside the unit circle at each of 2 values from 0 s to 10 ms, spectral ")
     (crossing,) = found["crossings"]
     assert crossing["value"] - 0.002 == pytest.approx(bode(servo).loops[0].delay_margin, abs=2e-8)
     assert np.hypot(crossing["real"], crossing["imaginary"]) == pytest.approx(1.0, abs=1e-6)
