@@ -14,20 +14,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from hypothesis.stateful import run_state_machine_as_test as run_machine
 
-from tests.extent import in_test_all, tries
+from tests.extent import tries
 from tests.fmus.expected import COMMAND, MEASUREMENT, law_command
 from tests.fmus.instance import Instance
 
 # -- as tools take them ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("error", [1e-12, -1e-12])
-def test_time_that_is_off_by_1e_12_moves_no_sample(error: float, controller: Instance) -> None:
-    controller.initialise(MEASUREMENT)
-    for k in range(200):
-        controller.step(k * 0.001 + (error if k % 3 else -error), 0.001)
-        assert controller.get(*COMMAND) == pytest.approx(law_command(k // 10 * 0.01), rel=1e-9)
-        assert controller.value("sample_count") == k // 10 + 1
 
 
 def test_time_that_is_off_by_1e_12_hardly_moves_the_plant(plant: Instance) -> None:
@@ -39,18 +30,6 @@ def test_time_that_is_off_by_1e_12_hardly_moves_the_plant(plant: Instance) -> No
             plant.step(k * 0.01 + error, 0.01)
         arrived.append(plant.get(*plant.names("output", "local")))
     assert arrived[0] == pytest.approx(arrived[1], abs=1e-11)
-
-
-@in_test_all
-def test_time_added_up_over_30_s_neither_loses_nor_delays_a_sample(controller: Instance) -> None:
-    controller.initialise(MEASUREMENT)
-    t = 0.0
-    for k in range(30_000):
-        controller.step(t, 0.001)
-        t += 0.001
-        assert controller.value("sample_count") == k // 10 + 1
-    assert t != 30.0  # the drift is there
-    assert controller.get(*COMMAND) == pytest.approx(law_command(29.99), rel=1e-9)
 
 
 def test_last_step_of_1e_13_s_adds_no_sample_and_hardly_moves_the_plant(controller: Instance, plant: Instance) -> None:
@@ -70,49 +49,12 @@ def test_last_step_of_1e_13_s_adds_no_sample_and_hardly_moves_the_plant(controll
         assert controller.get(*COMMAND) == pytest.approx(law_command(0.1), rel=1e-9)
 
 
-def test_samples_follow_the_time_and_not_the_number_of_calls(controller: Instance) -> None:
-    controller.initialise(MEASUREMENT)
-    t, count = 0.0, 0
-    steps = [(0.0003, True), (0.007, False), (0.01, False), (0.0001, True), (0.0126, False), (0.0099, True)]
-    for h, sampled in [*steps, (0.0001, False), (0.01, True)]:  # at 0, late at 0.0173, at 0.03 and at 0.04
-        controller.step(t, h)
-        if sampled:
-            expected, count = law_command(t), count + 1
-        assert controller.get(*COMMAND) == pytest.approx(expected, rel=1e-9)
-        assert controller.value("sample_count") == count
-        t += h
-
-
-def test_a_falling_plant_is_where_it_should_be_after_steps_of_any_length(plant: Instance) -> None:
-    level = {f"initial.quaternion.{axis}": 0.0 for axis in "xyz"}
-    plant.initialise({**level, "initial.quaternion.w": 1.0, "wind.amplitude.z": 0.0, "thrust": 0.0})
-    t = 0.0
-    for h in (0.01, 1e-13, 0.003, 0.25, 0.0007, 0.01, 1e-9, 0.1, 0.02 - 1e-13):
-        plant.step(t, h)
-        t += h
-        assert plant.get("position.z", "velocity.z") == pytest.approx([0.5 * 9.81 * t * t, 9.81 * t], rel=1e-12)
-
-
 @pytest.mark.parametrize("start", [5.0, -2.0, 1e4])
 def test_the_plant_starts_at_any_time(start: float, plant: Instance) -> None:
     plant.initialise({"wind.amplitude.x": 2.0, "wind.frequency": 3.0}, start=start)
     assert plant.get("wind.force.x") == pytest.approx([2.0 * math.cos(3.0 * start)], rel=1e-12)
     plant.step(start, 0.01)
     assert plant.get("wind.force.x") == pytest.approx([2.0 * math.cos(3.0 * (start + 0.01))], rel=1e-12)
-
-
-@pytest.mark.parametrize("start", [5.0, 5.003, 4.999, 1e4])
-def test_the_controller_starts_at_any_time_and_keeps_its_grid(start: float, controller: Instance) -> None:
-    controller.initialise(MEASUREMENT, start=start)
-    assert controller.get(*COMMAND) == pytest.approx(law_command(start), rel=1e-12)
-    last, count = start, 0
-    for k in range(35):
-        t = start + 0.001 * k
-        controller.step(t, 0.001)
-        if round(1000.0 * t) % 10 == 0:
-            last, count = t, count + 1
-        assert controller.get(*COMMAND) == pytest.approx(law_command(last), rel=1e-12)
-        assert controller.value("sample_count") == count
 
 
 # -- any sequence of them -------------------------------------------------------------------------------

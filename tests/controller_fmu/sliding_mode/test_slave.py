@@ -196,17 +196,6 @@ def test_step_no_longer_than_the_period_does_not_warn(step: float) -> None:
     assert warnings(slave) == []
 
 
-def test_time_added_up_by_the_master_drifts_through_no_sample() -> None:
-    slave, t = started({"sample_period": 0.01}), 0.0
-    for _ in range(3000):
-        slave.do_step(t, 0.001)
-        t += 0.001
-    assert count(slave) == 300
-    slave.do_step(t, 1e-13)
-    slave.do_step(t + 1e-13, 0.001)
-    assert count(slave) == 301
-
-
 # -- measurement ----------------------------------------------------------------------------------------------
 
 NOTHING = dict.fromkeys(measured(0), 0.0)
@@ -473,37 +462,8 @@ def test_an_error_of_python_is_reported_with_its_place_in_the_first_line(monkeyp
 # -- state ----------------------------------------------------------------------------------------------------
 
 
-def run_steps(slave: UnifiedController, steps: range) -> list[list[float]]:
-    """All Reals after each of the steps of 4 ms, with other inputs for each."""
-    history = []
-    for k in steps:
-        put(slave, measured(k % 13))
-        if k == 20:
-            put(slave, {"gain.surface": 4.0})
-        slave.do_step(0.004 * k, 0.004)
-        history.append([*slave._reals, count(slave)])
-    return history
-
-
 def as_bytes(slave: UnifiedController) -> bytes:
     return slave._fmu_state_to_bytes(slave._get_fmu_state())
-
-
-@pytest.mark.parametrize("saved_after", [0, 1, 3, 7, 20, 21])
-def test_restored_controller_flies_on_bit_by_bit(saved_after: int) -> None:
-    """The period of 10 ms is no multiple of the step: there is always a sample pending."""
-    slave = started({**measured(0), **PARAMETERS, "sample_offset": 0.003})
-    run_steps(slave, range(saved_after))
-    saved, state = as_bytes(slave), slave._get_fmu_state()
-    expected = run_steps(slave, range(saved_after, 40))
-    assert slave._fmu_state_from_bytes(saved) == state
-
-    slave._set_fmu_state(slave._fmu_state_from_bytes(saved))
-    assert run_steps(slave, range(saved_after, 40)) == expected
-
-    other = UnifiedController(instance_name="other")
-    other._set_fmu_state(other._fmu_state_from_bytes(saved))
-    assert run_steps(other, range(saved_after, 40)) == expected
 
 
 def test_tunable_parameter_that_was_set_but_not_used_is_part_of_the_state() -> None:
