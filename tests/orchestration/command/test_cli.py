@@ -131,47 +131,6 @@ def test_run_prints_its_answer_and_every_metric_on_a_line(main: Main) -> None:
     assert {line.split()[0] for line in lines} == flown().keys() - {"divergence_time"}
 
 
-FLAGS: list[tuple[list[str], dict[str, Any]]] = [
-    (
-        ["--period", "0.02", "--delay", "0.005", "--order", "jacobi"],
-        {"period": 0.02, "delay": 0.005, "order": "jacobi"},
-    ),
-    (["--loss", "0.3"], {"measurement_loss": 0.3, "command_loss": 0.3}),
-    (["--loss", "0.3", "--command-loss", "0"], {"measurement_loss": 0.3}),
-    (
-        ["--command-loss", "0.2", "--burst-length", "3", "--hold", "first", "--offset", "0.004"],
-        {"command_loss": 0.2, "burst_length": 3.0, "hold": "first", "offset": 0.004},
-    ),
-    (
-        [
-            "--jitter",
-            "0.004",
-            "--jitter-distribution",
-            "normal",
-            "--delay-jitter",
-            "0.003",
-            "--measurement-loss",
-            "0.1",
-        ],
-        {"jitter": 0.004, "jitter_distribution": "normal", "delay_jitter": 0.003, "measurement_loss": 0.1},
-    ),
-    (
-        ["--noise", "position=0.01", "--noise", "velocity.x=0.1", "--quantisation", "quaternion=0.001"],
-        {"noise": {"position": 0.01, "velocity.x": 0.1}, "quantisation": {"quaternion": 0.001}},
-    ),
-    (["--clock", "fmu", "--plant-interval", "0.002"], {"clock": "fmu", "plant_interval": 0.002}),
-    (["--clock-ratio", "1.01"], {"clock_ratio": 1.01}),
-]
-
-
-@pytest.mark.parametrize(("flags", "timing"), FLAGS, ids=[" ".join(flags) for flags, _ in FLAGS])
-def test_flags_mean_the_timing_of_their_names(main: Main, flags: list[str], timing: dict[str, Any]) -> None:
-    printed = json.loads(main("run", "--json", *SHORT, *flags).stdout)
-    del printed["verdict"]
-    assert {**printed, "wall_time": None} == flown(**timing)
-    assert flown(**timing) != flown() or timing.get("clock") == "fmu"
-
-
 def test_set_reaches_both_fmus(main: Main) -> None:
     for parameter in ("plant.mass=1.2", "controller.gain.eta=5"):
         printed = json.loads(main("run", "--json", *SHORT, "--set", parameter).stdout)

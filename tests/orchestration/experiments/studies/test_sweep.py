@@ -263,15 +263,6 @@ def test_a_design_with_an_invalid_run_is_refused_before_any_run(tmp_path: Path, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_that_diverges_is_done(tmp_path: Path) -> None:
-    wild = short(stop_time=20.0, plant_interval=0.1, period=0.2)
-    (row,) = bits(swept(study(axis("seed", 1), base=wild), tmp_path))
-    assert row["status"] == "done"
-    assert row["diverged"] == (1.0).hex()
-    assert 0.0 < float.fromhex(row["divergence_time"]) < 20.0
-    assert row["message"] is not None
-
-
 # -- signals ----------------------------------------------------------------------------------------------
 
 
