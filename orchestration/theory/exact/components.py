@@ -25,12 +25,10 @@ from orchestration.theory.stability.matrices import (
 )
 
 SAME = 1e-9
-"""Error of the predicted response, relative to the largest, up to which a component is linear"""
+"""Error of the predicted response, relative to the largest, up to which a component is linear, and difference of a step
+of 2 h to two of h; more where rounding of its coordinates decides"""
 ROUNDING = 1e-11
 """Least effect of rounding on a result, as a share of a response"""
-DIFFERS = 1e-9
-"""Difference allowed of a step of 2h to two of h, of a component that is identified to rounding; more where rounding
-of its coordinates decides"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,22 +87,20 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
     found = loop.tangent(name)
     tangent = found.whole if isinstance(found, LiftedTangent) else found
-    is_linear, precision = tangent.accuracy <= SAME, 0.0
+    accuracy, differs, precision = tangent.accuracy, max(SAME, min(tangent.rounding, INEXACT)), 0.0
     part: Continuous | SampledSystem
     if component.sampling is not None:
         part = _sampled(found, step)
     else:
-        allowed = INEXACT
-        if is_linear and tangent.rounding <= DIFFERS:
-            allowed = DIFFERS
-        elif is_linear:
-            precision = tangent.rounding
-            allowed = min(tangent.rounding, INEXACT)
-        matrices = in_continuous_time(tangent, step, allowed, component.step)
+        matrices = in_continuous_time(tangent, step, differs if accuracy <= SAME else INEXACT, component.step)
         part = replace(matrices, step=tangent.derivatives)
-    method = "saved states, to rounding" if is_linear else "saved states, by differences"
+        if accuracy > SAME or matrices.misfit > differs:
+            accuracy, precision = max(accuracy, matrices.misfit), matrices.misfit
+        elif differs > SAME:
+            precision = tangent.rounding
+    method = "saved states, to rounding" if accuracy <= SAME else "saved states, by differences"
     method += of_code(are_in_double({name: component}))
-    accuracy = max(ROUNDING, tangent.accuracy)
+    accuracy = max(ROUNDING, accuracy)
     return IdentifiedComponent(part=part, method=method, accuracy=accuracy, precision=precision, tangent=tangent)
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.stability.excitation import COARSE, Excitation, Rest, Rung
+from orchestration.theory.stability.excitation import COARSE, MAX_PULSE, Excitation, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import Tangent
+from orchestration.theory.stability.matrices import misfit
 
 HORIZONS = (16.0, 128.0, 1024.0)
 """Lengths of ladders, in periods, tried in turn while they show more states: a fast loop leaves slow states no time"""
@@ -28,6 +29,10 @@ SAMPLES = 32
 """Samples of the ladder of a sampled component"""
 LONGER = 4
 """Factor on it where it does not show a slow state precisely"""
+EXACT = 1e-9
+"""Error of a tangent in continuous time, relative, up to which its pulse is kept"""
+LARGER = 10.0
+"""Factor on it where the error is larger"""
 FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""
 SHRUNK = (1.0, 0.3, 0.1)
@@ -153,8 +158,31 @@ def in_continuous_time(rest: Rest, period: float, step: float, *, unit: float | 
         if end >= linear_until or (before is not None and len(tangent.state) <= len(before.state)):
             break
     assert found is not None
-    found.prove(step, 2.0 * sum(rung.duration for rung in found.ladder))
+    _prove(found, step)
+    return _above_rounding(found, step)
+
+
+def _above_rounding(found: Tangent, step: float) -> Tangent:
+    """A tangent by larger pulses, as long as these show the same states more accurately.
+
+    The pulse that is linear for longest may be so small that rounding spoils states which hardly move the outputs.
+    """
+    error = max(found.accuracy, misfit(found, step))
+    while error > EXACT and LARGER * found.pulse <= MAX_PULSE:
+        try:
+            larger = found.with_pulse(LARGER)
+            _prove(larger, step)
+        except UsageError:
+            break
+        after = max(larger.accuracy, misfit(larger, step))
+        if len(larger.state) < len(found.state) or after >= error:
+            break
+        found, error = larger, after
     return found
+
+
+def _prove(tangent: Tangent, step: float) -> None:
+    tangent.prove(step, 2.0 * sum(rung.duration for rung in tangent.ladder))
 
 
 def _points(first: float, end: float) -> Floats:

@@ -56,6 +56,8 @@ class Continuous(Matrices):
 
     step: Derivatives | None = None
     """the step of the simulated component, where that differs from the matrices"""
+    misfit: float = 0.0
+    """Difference of the state after a step of 2 h to that after two of h, relative"""
     unfit: str | None = None
     """why the matrices do not describe the component; None: they do"""
 
@@ -157,27 +159,36 @@ def in_continuous_time(
 ) -> Continuous:
     """The matrices of a component in continuous time.
 
-    `first` is a step [s] that it takes; two steps may differ from one of twice the length by `differs`, relative. Where
-    they do, shorter ones are tried down to its `own`, with which it is simulated; default: `first`.
+    `first` is a step [s] that it takes. Where two steps differ from one of twice the length by more than `differs`,
+    relative, shorter ones are tried down to its `own`, with which it is simulated; default: `first`.
     """
     count = len(tangent.outputs)
     h = first if tangent.unit is not None else _informative_step(tangent, first)
     shortest = first if own is None else min(own, first)
-    while h > shortest and _misfit(tangent, h, differs) is not None:
+    while (differs_by := misfit(tangent, h)) > differs and h > shortest:
         h = max(whole_nanoseconds(0.5 * h), shortest)
     by_state, by_input = tangent.derivatives(h)
     state, moved = by_state[count:], by_input[count:]
-    change = state - np.eye(len(state))
+    change, unfit = state - np.eye(len(state)), None
     if len(change) and np.linalg.norm(change, 2) > 2.0 * FAR:
-        unfit: str | None = f"a step of {h:g} s is too long to show what happens within it"
+        unfit = f"a step of {h:g} s is too long to show what happens within it"
         A, B, C, D = np.zeros_like(change), np.zeros_like(moved), by_state[:count], by_input[:count]
     else:
-        unfit = _misfit(tangent, h, differs)
+        if differs_by > INEXACT:
+            unfit = f"a step of {2 * h:g} s differs from two of {h:g} s by {differs_by:.1g}"
         A = _logarithm(change) / h
         B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
         C = by_state[:count] @ np.linalg.inv(state)
         D = _feedthrough(by_input[:count], C, moved)
-    return Continuous(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D, unfit=unfit)
+    return Continuous(
+        inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D, misfit=differs_by, unfit=unfit
+    )
+
+
+def misfit(tangent: Tangent, h: float) -> float:
+    """By how much the state after a step of 2 `h` [s] differs from that after two of `h`, relative."""
+    once, twice = (tangent.derivatives(step)[0][len(tangent.outputs) :] for step in (h, 2.0 * h))
+    return float(np.abs(twice - once @ once).max(initial=0.0)) / max(1.0, float(np.abs(twice).max(initial=0.0)))
 
 
 def depends_on_step(tangent: Tangent, period: float) -> bool:
@@ -215,15 +226,6 @@ def _feedthrough(whole: Floats, C: Floats, moved: Floats) -> Floats:
     terms = np.maximum(np.abs(whole), np.abs(C) @ np.abs(moved))  # they may cancel
     found[np.abs(found) <= NO_FEEDTHROUGH * terms.max(axis=1, keepdims=True, initial=0.0)] = 0.0
     return found
-
-
-def _misfit(tangent: Tangent, h: float, differs: float) -> str | None:
-    """Why it is no linear system in continuous time; None: it is one."""
-    once, twice = (tangent.derivatives(step)[0][len(tangent.outputs) :] for step in (h, 2.0 * h))
-    difference = float(np.abs(twice - once @ once).max(initial=0.0)) / max(1.0, float(np.abs(twice).max(initial=0.0)))
-    if difference <= differs:
-        return None
-    return f"a step of {2 * h:g} s differs from two of {h:g} s by {difference:.1g}"
 
 
 def _informative_step(tangent: Tangent, first: float) -> float:

@@ -19,9 +19,12 @@ def decaying(h: float) -> tuple[Floats, Floats]:
     return np.array([[after], [after]]), np.full((2, 1), 1.0 - np.exp(-h))
 
 
-@pytest.mark.parametrize("rounding", [0.0, 1e-7])
-def test_a_step_differs_from_two_of_half_its_length_by_as_much_as_coordinates_round(
-    rounding: float,
+@pytest.mark.parametrize(
+    ("rounding", "precision", "method"),
+    [(0.0, 3.0 * ROUGH, "saved states, by differences"), (1e-7, 1e-7, "saved states, to rounding")],
+)
+def test_a_step_that_differs_from_two_of_half_its_length_is_known_as_accurately_unless_coordinates_round_so(
+    rounding: float, precision: float, method: str
 ) -> None:
     tangent = SimpleNamespace(
         inputs=("u",), outputs=("y",), unit=0.01, accuracy=0.0, rounding=rounding, derivatives=decaying
@@ -32,4 +35,6 @@ def test_a_step_differs_from_two_of_half_its_length_by_as_much_as_coordinates_ro
     loop: Any = SimpleNamespace(simulation=simulation, tangent=lambda name: tangent)
     found = components._identified(loop, "plant")
     assert isinstance(found.part, Continuous)
-    assert (found.part.unfit is None, found.precision) == (bool(rounding), rounding)
+    assert (found.part.unfit, found.method) == (None, method)
+    assert found.precision == pytest.approx(precision, rel=0.02)
+    assert found.accuracy == (components.ROUNDING if rounding else found.precision)

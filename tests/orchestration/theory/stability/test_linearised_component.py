@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from orchestration.foundation.basics.simulator import Floats, Transfer
+from orchestration.theory.stability import matrices
 from orchestration.theory.stability.excitation import Excitation, ImpreciseError, Rest, Rung
-from orchestration.theory.stability.identification import of_samples
+from orchestration.theory.stability.identification import in_continuous_time, of_samples
 from orchestration.theory.stability.lifted_component import of_one_rate
 from orchestration.theory.stability.linearised_component import Tangent
 from quadcosim import UsageError
@@ -100,6 +101,41 @@ def test_pulses_are_as_large_as_the_response_is_linear(samples: int) -> None:
     assert responses(bent, samples + 3) == pytest.approx(responses(Line(samples), samples + 3), abs=1e-9)
     assert bent.accuracy < 1e-9
     assert line.accuracy < 1e-12
+
+
+class Levitated(Line):
+    """A ball below an electromagnet, by its voltage: it falls away from where it rests, the faster the further."""
+
+    CURRENT = (0.05 * 9.81 / 7e-5) ** 0.5 * 0.01
+    VOLTAGE = 5.0 * CURRENT
+
+    def __init__(self) -> None:
+        self.kept, self.u = np.array([self.CURRENT, 0.0, 0.01]), self.VOLTAGE
+
+    def rate(self, x: Floats) -> Floats:
+        current, speed, gap = x
+        pull = 7e-5 * (current / gap) ** 2 / 0.05
+        return np.array([(self.u - 5.0 * current) / 0.02, 9.81 - pull, speed])
+
+    def step(self, t: float, h: float) -> None:
+        count = int(np.ceil(h / 0.00025 - 1e-6))
+        h /= count
+        for _ in range(count):  # by the method of Runge and Kutta
+            a = self.rate(self.kept)
+            b = self.rate(self.kept + 0.5 * h * a)
+            c = self.rate(self.kept + 0.5 * h * b)
+            self.kept = self.kept + h / 6.0 * (a + 2.0 * b + 2.0 * c + self.rate(self.kept + h * c))
+
+
+def test_pulses_are_enlarged_where_rounding_spoils_states_that_hardly_move_the_output() -> None:
+    ball: Any = Levitated()
+    held = np.array([ball.VOLTAGE])
+    about = Rest(fmu=ball, inputs=("u",), held=held, outputs=("y",), time=0.0)
+    found = matrices.in_continuous_time(in_continuous_time(about, 0.001, 0.0005), 0.00025)
+    falls = (2.0 * 9.81 / 0.01) ** 0.5
+    assert found.unfit is None
+    assert 1e-9 < found.misfit < matrices.INEXACT
+    assert np.sort(np.linalg.eigvals(found.A).real) == pytest.approx([-250.0, -falls, falls], rel=1e-5)
 
 
 class Alternating(Line):
