@@ -138,10 +138,12 @@ class Study:
     def system_at(self, point: Mapping[str, Value], starts: StartValues) -> System:
         """The system with a value of each axis, likewise."""
         changes: dict[str, Any] = {}
+        settings = [dict.fromkeys(axis.targets, point[axis.name]) for axis in self.axes]
         chosen = {
-            path: placed(path, point[axis.name], self.folder)
-            for axis in self.axes
-            for path in self.paths_of(axis.targets)
+            path: placed(path, value, self.folder)
+            for sets in (*settings, *(each.of(point)[0] for each in self.together))
+            for target, value in sets.items()
+            for path in self._paths[target]
             if names_fmu(path)
         }
         if self.vary_seed and "seed" not in point:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar, cast
 
@@ -41,6 +41,14 @@ class AxisTable:
     """Whether the range has equal steps or equal ratios."""
 
 
+@record()
+class LabelledAxisTable(AxisTable):
+    """`[[axes]]` of a study, whose values may have labels."""
+
+    labels: list[str] | None = None
+    """The names of its values, in their order, which tables, figures and `--at` have in place of these."""
+
+
 OF_BASE = dict.fromkeys(
     ("stop_time", "components"),
     'it is of a system or scenario file, which scenario = "FILE.toml" names here; or expected under [base]',
@@ -67,7 +75,7 @@ class StudyFile:
     """The path of the system file or scenario file that the study varies."""
     base: dict[str, Any] = field(default_factory=dict)
     """The same given here instead of in a separate file: the tables of a system file or a scenario file."""
-    axes: list[AxisTable] = field(default_factory=list)
+    axes: list[LabelledAxisTable] = field(default_factory=list)
     """The axes."""
     design: DesignTable = field(default_factory=DesignTable)
     """The sampling of the axes without values."""
@@ -170,6 +178,7 @@ def _study(file: StudyFile, path: Path) -> Study:
         raise UsageError(f"design.seed = {file.design.design_seed}: expected a whole number from 0")
     axes = tuple(axis_of(table) for table in file.axes)
     base, together = _with_controllers(base_of(file, path.parent), axes)
+    axes, together = _labelled(file.axes, axes, together)
     study = Study(
         name=file.name or path.stem,
         base=base,
@@ -202,6 +211,34 @@ def _with_controllers(base: Request, axes: tuple[Axis, ...]) -> tuple[Request, t
         given = {name for name in parameters if value_at(system_of(bare), *bare.paths_of(name)) is not None}
         sets[controller,] = {name: value for name, value in parameters.items() if name not in given}
     return bare, (LinkedSettings(axes=(of_controllers[0].name,), sets=sets),)
+
+
+def _labelled(
+    tables: list[LabelledAxisTable], axes: tuple[Axis, ...], together: tuple[LinkedSettings, ...]
+) -> tuple[tuple[Axis, ...], tuple[LinkedSettings, ...]]:
+    """The axes with labels as their values, and what these stand for, before what was `together` already."""
+    named, stands_for = list(axes), []
+    for i, (table, axis) in enumerate(zip(tables, axes)):
+        if table.labels is None:
+            continue
+        values, names = axis.values or (), table.labels
+        if axis.multiplies or not len({*names}) == len(names) == len(values):
+            raise UsageError(
+                f"axis {axis.name}: labels = {shown(names)}: expected a different one for each value that it sets"
+            )
+        sets: dict[tuple[Value, ...], dict[str, Value]] = {
+            (name,): dict.fromkeys(axis.targets, value) for name, value in zip(names, values)
+        }
+        stands_for.append(LinkedSettings(axes=(axis.name,), sets=sets))
+        label = dict(zip(values, names))
+        together = tuple(
+            replace(each, sets={(label[key[0]],): changes for key, changes in each.sets.items()})
+            if each.axes == (axis.name,)
+            else each
+            for each in together
+        )
+        named[i] = replace(axis, targets=(), values=tuple(names))
+    return tuple(named), (*stands_for, *together)
 
 
 def _expect_consumed(file: StudyFile, study: Study) -> None:

@@ -215,7 +215,7 @@ def test_without_a_base_it_is_the_flight_of_the_paper(tmp_path: Path) -> None:
     ("text", "place", "valid"),
     [
         ("nonsense = 1\n" + ONE, "nonsense", "name, scenario, base, axes, design, keep_signals"),
-        (ONE + "steps = 3\n", "steps", "name, sets, multiplies, values, start, stop, number, scale"),
+        (ONE + "steps = 3\n", "steps", "name, sets, multiplies, values, start, stop, number, scale, labels"),
         (ONE + "[design]\nsteps = 3\n", "design.steps", "method, samples, seed, vary_seed"),
         ("[base]\nduration = 3\n" + ONE, "duration", ", ".join(field.name for field in fields(Scenario))),
         ("[base.timing]\nrate = 3\n" + ONE, "timing.rate", ", ".join(TIMING_KEYS)),
@@ -332,6 +332,10 @@ def test_parameters_of_one_law_stand_in_a_vehicle_file_and_elsewhere_the_error_s
     study = load(tmp_path, f'[base]\nvehicle = "one_rate.toml"\n{LAWS}')
     laws = [study.system(index, {}).components["controller"].parameters for index in (0, 1)]
     assert laws == [{}, {"velocity_ratio": 1, "attitude_ratio": 1}]
+    labels = 'labels = ["law", "cascade"]\n'
+    named = load(tmp_path, f'[base]\nvehicle = "one_rate.toml"\n{LAWS}{labels}')
+    assert [named.system(index, {}) for index in (0, 1)] == [study.system(index, {}) for index in (0, 1)]
+    assert "labels = ['law']: expected a different one for each" in refused(tmp_path, LAWS + "labels = ['law']\n")
     there = r"\[controllers.NAME\] of a vehicle file, vehicle = \"FILE\" under \[base\]"
     other = load(tmp_path, f"[base.controller]\nvelocity_ratio = 1\n{LAWS}")
     with pytest.raises(UsageError, match=f"controller.velocity_ratio: UnifiedController has no .*{there}"):

@@ -1,6 +1,7 @@
 """Studies and limits of a system that is no quadrotor: a double integrator under state feedback, with known answers."""
 
 import dataclasses
+import itertools
 import json
 import math
 from pathlib import Path
@@ -90,15 +91,15 @@ def test_the_figure_of_a_system_is_of_its_first_objective_that_varies(swept: tup
         draw_study(chosen, folder, "ultimate_bound")
 
 
-def test_an_axis_multiplies_what_the_law_of_the_run_has(tmp_path: Path) -> None:
+def test_an_axis_multiplies_what_the_law_of_the_run_has_also_by_its_label() -> None:
     """Not what that of the base has: a factor of 1 would be another gain."""
     laws = {"UnifiedController": 15.0, "GeometricController": 104.26}
-    (tmp_path / "study.toml").write_text(
-        '[[axes]]\nname = "gain"\nmultiplies = ["controller.gain.attitude"]\nvalues = [1.0, 2.0]\n'
-        f'[[axes]]\nname = "controller"\nvalues = {[*laws]}\n'
-    )
-    chosen = load_study(tmp_path / "study.toml")
-    for native in (False, True):
+    gain = {"name": "gain", "multiplies": ["controller.gain.attitude"], "values": [1.0, 2.0]}
+    controllers = {"name": "controller", "values": [*laws]}
+    labelled = {**controllers, "labels": ["sliding", "geometric"]}
+    for native, axes in itertools.product((False, True), (controllers, labelled)):
+        chosen = load_study({"name": "study", "axes": [gain, axes]})
+        assert [chosen.points[i]["controller"] for i in range(2)] == axes.get("labels", [*laws])
         variant = dataclasses.replace(chosen, native=native)
         starts = variant.files().start_values
         gains = [variant.system(i, starts).components["controller"].parameters["gain.attitude"] for i in range(4)]
