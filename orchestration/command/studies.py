@@ -24,6 +24,10 @@ At = Annotated[
     list[str] | None, option("--at", "Only the cells at that value of an axis; may be repeated.", "NAME=VALUE")
 ]
 
+Mean = Annotated[
+    bool, option("--mean", "The mean of the metric over all runs that have it, not the median over the good ones.")
+]
+
 FIRST = 1000
 """Number of runs of a study that are checked for infinite means"""
 
@@ -112,9 +116,10 @@ def export(
     ] = None,
     table: Annotated[str | None, TABLE] = None,
     metric: Annotated[
-        str | None, option("--metric", "Metric whose medians, or shares, in the cells are written too.")
+        str | None, option("--metric", "Metric whose medians, means or shares in the cells are written too.")
     ] = None,
     at: At = None,
+    mean: Mean = False,
 ) -> CommandResult:
     """Write the rows of a study, or the signals and events of a run, as CSV, MAT or Parquet, with their units."""
     from orchestration.experiments.studies.store import store_folder, store_path
@@ -122,8 +127,8 @@ def export(
     from orchestration.experiments.studies.table import of_run, of_study
 
     printed_tables.expect_format(table)
-    if what.is_dir() and (table, metric) != (None, None):
-        raise UsageError(f"{what}: expected a study file with --table and --metric")
+    if what.is_dir() and (table, metric, mean) != (None, None, False):
+        raise UsageError(f"{what}: expected a study file with --table, --metric and --mean")
     if at and table is None:
         raise UsageError("--at: expected --table with it, which it is for; the files have all cells")
     if what.is_dir() and store is not None:
@@ -135,12 +140,12 @@ def export(
     study = load_study(what)
     path = _current_store(what, store_folder(study.name, store, out))
     if table is None:
-        return result_of_files(of_study(path, formats or (), study, metric, out=out))
+        return result_of_files(of_study(path, formats or (), study, metric, out=out, mean=mean))
     from orchestration.command.study_table import study_table
     from orchestration.experiments.studies.shares import GOOD
 
-    printed = study_table(study, path, metric or GOOD, at or ())
-    written = of_study(path, formats or (), study, metric, out=out)
+    printed = study_table(study, path, metric or GOOD, at or (), mean=mean)
+    written = of_study(path, formats or (), study, metric, out=out, mean=mean)
     for file in written:
         inform(str(file))  # standard output is the table alone, for a file
     lines = list(printed_tables.lines(printed, table))
@@ -156,6 +161,7 @@ def draw(
         str | None, option("--metric", "Metric to draw; default: the first objective that varies.")
     ] = None,
     at: At = None,
+    mean: Mean = False,
     *,
     look: FigureFlags,
 ) -> CommandResult:
@@ -169,7 +175,8 @@ def draw(
         expect_metric(loaded, metric)
         store = store_folder(loaded.name, store, out)
         _current_store(study, store)
-        return result_of_files(draw_study(loaded, store, metric, look.figure_style, progress, out=out, at=at or ()))
+        style = look.figure_style
+        return result_of_files(draw_study(loaded, store, metric, style, progress, out=out, at=at or (), mean=mean))
 
 
 def _sweep_command(study: Path, out: Path | None) -> str:

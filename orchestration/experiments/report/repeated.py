@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from orchestration.experiments.report.model import CellMap, MapCell, RepeatedMaps
 from orchestration.experiments.report.tables import ColumnAxis, Row
+from orchestration.experiments.studies.axes import names_of
 from orchestration.experiments.studies.shares import TwoLaws, differences_of, laws_of, shares_of, with_chance
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
@@ -113,7 +114,8 @@ def share_maps(runs: RunsInCells, title: str, *, is_other: bool = False) -> list
 def difference_map(runs: RunsInCells, laws: TwoLaws, title: str = "difference") -> CellMap:
     """The share of the second law minus that of the first."""
     table = runs.table[runs.table[laws.axis].isin(laws[1:])]
-    title = f"{title}, {_short(laws.second)} minus {_short(laws.first)}"
+    first, second = names_of(laws[1:]).values()
+    title = f"{title}, {second} minus {first}"
     cells = _cells(runs, differences_of(table, runs.by, laws), table, table[:0], is_difference=True)
     return CellMap(title=title, is_difference=True, cells=tuple(cells))
 
@@ -130,8 +132,8 @@ def _maps(
     """A map for each law of some cells, which open the runs in a table, and list the `others`."""
     each, groups = (found, table, others), [("", found, table, others)]
     if runs.law is not None:
-        laws = runs.table[runs.law].unique()
-        groups = [(f", {_short(str(law))}", *(one[one[runs.law] == law] for one in each)) for law in laws]
+        laws = names_of(runs.table[runs.law].unique())
+        groups = [(f", {name}", *(one[one[runs.law] == law] for one in each)) for law, name in laws.items()]
     return [
         CellMap(
             title=title + end,
@@ -186,7 +188,3 @@ def _value(axis: ColumnAxis, value: Any) -> float | str:
 
 def _shown(value: float, word: str | None) -> str:
     return f"{100.0 * value:+.3g} %" if word is None and value else f"{100.0 * value:.3g} %"
-
-
-def _short(law: str) -> str:
-    return law.rpartition("/")[2]

@@ -1,7 +1,7 @@
 """The axes of a study, their display names, the points that they span, and settings linked to their values."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, overload
 
@@ -233,6 +233,13 @@ def quantity_of(axis: Axis, units: Mapping[str, str]) -> Quantity:
 def name_of(axis: Axis) -> str:
     """The display name of an axis: its own name, or that of its target if it is named by its path."""
     return labels.setting(axis.name) if axis.name in axis.targets else labels.words(axis.name)
+
+
+def names_of(values: Iterable[Value]) -> dict[Value, str]:
+    """The display names of values: of paths the last parts, if these differ."""
+    listed = list(dict.fromkeys(values))
+    short = [str(value).rpartition("/")[2] for value in listed]
+    return dict(zip(listed, short if len({*short}) == len(short) else map(str, listed)))
 
 
 def picked(axes: Sequence[Axis], texts: Sequence[str]) -> dict[str, Value]:

@@ -1,4 +1,4 @@
-"""Figures of cells: shares of good runs with their intervals, medians, and the difference between two laws."""
+"""Figures of cells: shares of good runs with their intervals, medians or means, and the difference between two laws."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,17 +12,20 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from orchestration.experiments.studies.axes import SCALES, Axis, name_of, quantity_of
+from orchestration.experiments.studies.axes import SCALES, Axis, name_of, names_of, quantity_of
 from orchestration.experiments.studies.figures import make_room, mark_edge
 from orchestration.experiments.studies.shares import (
     GOOD,
+    INTERVALS,
+    MEAN,
+    MEDIAN,
     WITH_VALUE,
     TwoLaws,
-    differences_of,
-    differences_of_medians,
-    medians_of,
+    averages_of,
+    differences_in,
+    judged_by,
+    left_out,
     shares_of,
-    without_value,
 )
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
@@ -47,7 +50,8 @@ ROW = 0.05
 """Share of the height of a panel that a row of numbers takes"""
 BESIDE = 4.5
 """Distance [pt] of a number, and of a sign with one, from the middle of a cell with a dot"""
-_NO_VALUE = "no value"
+_NO_VALUE, _SOME = "no value", "some runs left out"
+HOLLOW: Any = {"markersize": 3.5, "markerfacecolor": "white", "zorder": 3}
 OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{}  •  −"
 """Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
 
@@ -60,23 +64,25 @@ def cell_lines(
     words: tuple[str, str],
     *,
     units: Mapping[str, str],
+    average: str = MEDIAN,
     style: Style = SCREEN,
 ) -> Figure:
-    """The share of good runs, or the median of a metric, with its interval at 95 %, over one axis.
+    """The share of good runs, or the median or mean of a metric, with its interval at 95 %, over one axis.
 
-    `laws` is an axis of names, such as controllers: a line for each. Crosses at the lower edge are values without a
-    median; the numbers of runs of medians stand at the upper edge, in a row for each line, where there is room.
+    `laws` is an axis of names, such as controllers: a line for each. A mark is hollow where some runs are left out;
+    crosses at the lower edge are values without an average. The numbers of runs averaged stand at the upper edge, in a
+    row for each line, where there is room.
     """
     across = quantity_of(axis, units)
     figure = style.figure(32.0)
     panel = figure.add_subplot()
     names = _names(axis, laws)
-    found = shares_of(table, names)
-    shown = found if metric == GOOD else medians_of(table, names, metric)
-    column = "share" if metric == GOOD else "median"
+    found = shares_of(table if average == MEDIAN else judged_by(table, metric), names)
+    shown = found if metric == GOOD else averages_of(table, names, metric, average)
+    column = "share" if metric == GOOD else average
     groups = _by_value(shown, laws, units)
     lacking: dict[str | tuple[float, ...], Floats] = {}
-    lacks, numbers = [], {}
+    lacks, numbers, hollow = [], {}, False
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
@@ -84,18 +90,21 @@ def cell_lines(
         if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
             ends = np.abs(group[["low", "high"]].to_numpy().T - group[column].to_numpy())
             panel.errorbar(at, group[column], ends, fmt="none", ecolor=how["color"], elinewidth=0.8, capsize=2.5)
-            counts = group.loc[group[WITH_VALUE] > 0, [axis.name, WITH_VALUE]].to_numpy()
-            numbers[how["color"]] = [*zip(across.of(counts[:, 0]), counts[:, 1].astype(int))]
+            some = group[group[WITH_VALUE].between(1, group["count"] - 1)]
+            hollow |= len(some) > 0
+            panel.plot(across.of(some[axis.name]), some[column], MARKS[i % len(MARKS)], color=how["color"], **HOLLOW)
+            valued = group[group[WITH_VALUE] > 0]
+            numbers[how["color"]] = [*zip(across.of(valued[axis.name]), _numbers(valued, valued["count"]))]
             if len(without := group.loc[group[WITH_VALUE] == 0, axis.name]):
                 lacking[how["color"]] = across.of(without)
                 lacks.append(f"{f'by {law} ' if law else ''}at {', '.join(map(across.text_of, without))}")
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
-    most = max((len(f"{count}") for row in numbers.values() for _, count in row), default=0)
+    most = max((len(count) for row in numbers.values() for _, count in row), default=0)
     numbered = bool(most) and (most + 1) * found[axis.name].nunique() <= letters_of(style, 1)
     panel.set(
         xlabel=across.title,
-        ylabel=_title(metric, words, units, numbered=numbered, repeats=True),
+        ylabel=_title(metric, words, units, average, numbered=numbered, repeats=True),
         xscale=SCALES[axis.scale],
     )
     if metric == GOOD:
@@ -105,26 +114,30 @@ def cell_lines(
     if lacking:
         mark_edge(panel, lacking, "x", low=True)
         panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
-    if laws is not None or lacking:
-        names = [*(law for law, _ in groups), *([_NO_VALUE] if lacking else [])]
+    if hollow:
+        panel.plot([], [], "o", color=BLACK if laws else BLUE, label=_SOME, **HOLLOW)
+    if laws is not None or lacking or hollow:
+        names = [*(law for law, _ in groups), *([_NO_VALUE] if lacking else []), *([_SOME] if hollow else [])]
         title = None if laws is None else name_of(laws)
         figure.legend(loc="outside lower center", title=title, ncols=abreast(names, style))
     said = [_repetitions(found, metric)]
-    if said[0] and metric != GOOD:
-        said += ["bars: 95 % intervals of order statistics, where runs suffice", without_value(shown)]
-    said += [f"crosses: no {words[0]} run with a value {' and '.join(lacks)}"] if lacks else []
+    if metric != GOOD:
+        said += [f"bars: 95 % intervals {INTERVALS[average]}, where runs suffice"] if said[0] else []
+        said.append(left_out(shown, words[0]))
+    good = "" if average == MEAN else f"{words[0]} "
+    said += [f"crosses: no {good}run with a value {' and '.join(lacks)}"] if lacks else []
     style.set_title(figure, "; ".join(filter(None, said)))
     return figure
 
 
-def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, int]]]) -> None:
+def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, str]]]) -> None:
     """Write numbers at their places along the upper edge, a row for each colour, above all marks."""
     step = min(ROW, 0.4 / len(numbers))
     make_room(panel, step * (len(numbers) + 0.5))
     for row, (color, counts) in enumerate(numbers.items()):
         for at, count in counts:
             panel.text(
-                at, 1.0 - (row + 0.5) * step, f"{count}", color=color, ha="center", va="center", fontsize="x-small",
+                at, 1.0 - (row + 0.5) * step, count, color=color, ha="center", va="center", fontsize="x-small",
                 transform=panel.get_xaxis_transform(),
             )  # fmt: skip
 
@@ -137,21 +150,24 @@ def cell_maps(
     words: tuple[str, str],
     *,
     units: Mapping[str, str],
+    average: str = MEDIAN,
     style: Style = SCREEN,
 ) -> Figure:
-    """The share of good runs, or the median of a metric, over two axes; the line is where half of the runs are good.
+    """The share of good runs, or the median or mean of a metric, over two axes; the line is where half are good.
 
     There is a panel for each value of the `third` axis, numbers or names, such as controllers; and for two names one of
     their difference, with dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs
-    that are both good.
+    that are both averaged. Of means half of the runs have a value at the line.
     """
     x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
     places = (x.edges, y.edges)
-    found = shares_of(table, _names(*axes, third))
-    found["value"], left_out = found["share"], ""
+    names = _names(*axes, third)
+    found = shares_of(table if average == MEDIAN else judged_by(table, metric), names)
+    found["value"], absent = found["share"], ""
     if metric != GOOD:
-        medians = medians_of(table, _names(*axes, third), metric)  # the rows are the same, in the same order
-        found["value"], found[WITH_VALUE], left_out = medians["median"], medians[WITH_VALUE], without_value(medians)
+        averages = found[names].merge(averages_of(table, names, metric, average), on=names)
+        found["value"], found[WITH_VALUE], found["of"] = averages[average], averages[WITH_VALUE], averages["count"]
+        absent = left_out(averages, words[0])
     groups = _by_value(found, third, units)
     both = _two_laws(third)
     count = len(groups) + (both is not None)
@@ -176,24 +192,22 @@ def cell_maps(
             at, up = (quantity.of(group[axis.name]) for quantity, axis in zip((x, y), axes))
             write_counts(panel, at, up, group["good"], group["count"], OF_ALL if has_room[OF_ALL] else ALONE)
         elif writes and repeats:
-            _write_numbers(panel, (x, y), axes, group[group[WITH_VALUE] > 0].set_index(_names(*axes))[WITH_VALUE], 0.0)
+            valued = group[group[WITH_VALUE] > 0].set_index(_names(*axes))
+            texts = _numbers(valued, valued["of" if has_room[OF_ALL] else WITH_VALUE])
+            _write_numbers(panel, (x, y), axes, texts, 0.0)
         panel.set_title(law or "")
     empty = [np.where(np.isnan(grid["value"]) & ~np.isnan(grid["share"]), 0.0, np.nan) for grid in grids]
     for panel, none_good in zip(panels, empty):
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
     if filled is not None:
         numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
-        title = _title(metric, words, units, numbered=numbered, repeats=repeats)
+        title = _title(metric, words, units, average, numbered=numbered, repeats=repeats)
         figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
     if both is not None:
-        names = _names(*axes, third)
-        if metric == GOOD:
-            of_pairs, of = differences_of(table, names, both), "difference of the shares"
-        else:
-            of_pairs = differences_of_medians(table, names, both, metric)
-            of = labels.metric_with_unit(
-                "median difference", units.get(metric) or labels.METRICS.get(metric, ("", None))[1]
-            )
+        of_pairs, of = differences_in(table, names, both, metric, average), "difference of the shares"
+        if metric != GOOD:
+            unit = units.get(metric) or labels.METRICS.get(metric, ("", None))[1]
+            of = labels.metric_with_unit(f"{average} difference", unit)
             of += ",\nnumber of pairs" if has_room[MARKED] and repeats else ""
         unpaired = _difference(
             figure, panels[2], places, axes, (x, y), of_pairs, of, writes=has_room[MARKED] and repeats
@@ -209,20 +223,21 @@ def cell_maps(
             panel.set_yticks(*y.ticks(MAX_TICKS))
     for panel in panels[:count:columns]:
         panel.set_ylabel(y.title)
-    excludes = "Newcombe's for pairs" if metric == GOOD else "the 95 % interval of the median of pairs"
+    excludes = "Newcombe's for pairs" if metric == GOOD else f"the 95 % interval of the {average} of pairs"
     said = [
         _repetitions(found, metric),
         f"+ and −: sign of the difference; dots: {excludes} excludes 0" if both is not None else "",
-        left_out,
+        absent,
     ]
-    style.set_title(figure, "; ".join(filter(None, said)) if said[0] or left_out else "")
+    style.set_title(figure, "; ".join(filter(None, said)) if said[0] or absent else "")
+    word = words[0] if average == MEDIAN else "with a value"
     handles: list[Patch | Line2D] = []
     if any(_has_limit(grid["share"]) for grid in grids):
-        label = f"{'half of the runs' if repeats else 'limit of what is'} {words[0]}"
+        label = f"{'half of the runs' if repeats else 'limit of what is'} {word}"
         handles.append(Line2D([], [], color=mesh.LIMIT["colors"], label=label))
     if np.isfinite(np.stack(empty)).any():
-        word = f"{'none' if repeats else 'not'} {words[0]}"
-        handles.append(Patch(color=NOT_GOOD, label=f"{word}, or no value" if left_out else word))
+        label = f"{'none' if repeats else 'not'} {word}"
+        handles.append(Patch(color=NOT_GOOD, label=f"{label}, or no value" if absent and average == MEDIAN else label))
     if any(np.isnan(grid["share"]).any() for grid in grids):
         handles.append(mesh.hatched())
     if both is not None and unpaired:
@@ -263,7 +278,7 @@ def _by_value(table: "pd.DataFrame", axis: Axis | None, units: Mapping[str, str]
     if axis is None:
         return [("", table)]
     of, values = quantity_of(axis, units), axis.values or ()
-    named = {value: str(value).rpartition("/")[2] for value in values}
+    named = names_of(values)
     if axis.is_numeric:
         named = {value: f"{of.name} {of.text_of(float(value))}" for value in sorted(map(float, values))}
     return [(name, table[table[axis.name] == value]) for value, name in named.items()]
@@ -311,6 +326,12 @@ def write_counts(
     for across, up, some, all_ in zip(x, y, good, count):
         color = "white" if some < HALF * all_ else BLACK
         panel.text(across, up, form.format(some, all_), color=color, ha="center", va="center", fontsize="x-small")
+
+
+def _numbers(cells: "pd.DataFrame", of: "pd.Series") -> "pd.Series":
+    """The number of runs averaged, with that of all where they are fewer."""
+    counts = cells[WITH_VALUE].astype(str)
+    return counts.where(cells[WITH_VALUE] == of, counts + "/" + of.astype(str))
 
 
 def _write_numbers(
@@ -368,13 +389,16 @@ def _difference(
     return bool(unknown.any())
 
 
-def _title(metric: str, words: tuple[str, str], units: Mapping[str, str], *, numbered: bool, repeats: bool) -> str:
+def _title(
+    metric: str, words: tuple[str, str], units: Mapping[str, str], average: str, *, numbered: bool, repeats: bool
+) -> str:
     if metric == GOOD:
         return f"share of {words[0]} runs" + (", and their number" if numbered else "")
     named = labels.metric_with_unit(metric, units.get(metric))
     if not repeats:
-        return f"{named},\nwhere {words[0]}"
-    return f"median of {named},\n{'number of' if numbered else 'of the'} {words[0]} runs with a value"
+        return named if average == MEAN else f"{named},\nwhere {words[0]}"
+    good = "" if average == MEAN else f"{words[0]} "
+    return f"{average} of {named},\n{'number of' if numbered else 'of the'} {good}runs with a value"
 
 
 def _repetitions(cells: "pd.DataFrame", metric: str) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ from orchestration.experiments.studies.axes import Axis, Value, picked, unit_poi
 from orchestration.experiments.studies.cell_figures import MAX_PANELS, cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
-from orchestration.experiments.studies.shares import BOOLEAN, GOOD, judged_by, with_chance
+from orchestration.experiments.studies.shares import BOOLEAN, GOOD, MEAN, MEDIAN, expect_mean, judged_by, with_chance
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -46,15 +46,18 @@ def draw_study(
     *,
     out: Path | None = None,
     at: Sequence[str] = (),
+    mean: bool = False,
 ) -> list[Path]:
     """Draw a metric from the store of `study` in a folder, default: the first objective that varies; the paths.
 
     The figures are written to `out`, by default beside the store. With `design.repeat` the default is the share of good
-    runs. `at` chooses values of axes, as `delay=0.02`, for a figure over the others. Raises `UsageError` for an unknown
+    runs. `at` chooses values of axes, as `delay=0.02`, for a figure over the others; with `mean` cells have the mean of
+    a metric over all runs that have it, in place of the median over the good ones. Raises `UsageError` for an unknown
     metric or value, or axes for which there is no figure.
     """
     path = store_path(study.name, folder)
-    drawn, indices = study_figures(study, path, metric, style, picked(study.cell_axes, at))
+    drawn, indices = study_figures(study, path, metric, style, picked(study.cell_axes, at), mean=mean)
+    drawn = {f"mean_{name}" if mean else name: figure for name, figure in drawn.items()}
     drawn = {"_".join((name, *at)).replace("/", "_"): figure for name, figure in drawn.items()}
     place = path.parent if out is None else out
     with new_files(place) as new:
@@ -64,7 +67,13 @@ def draw_study(
 
 
 def study_figures(
-    study: Study, store: Path, metric: str | None, style: Style = SCREEN, at: Mapping[str, Value] = {}
+    study: Study,
+    store: Path,
+    metric: str | None,
+    style: Style = SCREEN,
+    at: Mapping[str, Value] = {},
+    *,
+    mean: bool = False,
 ) -> tuple[dict[str, Figure], list[sensitivity.Index]]:
     """The figures of a metric over the axes of `study` by name, and the sensitivity indices that they show, if any.
 
@@ -73,6 +82,8 @@ def study_figures(
     Raises `UsageError` as `draw_study` does.
     """
     expect_metric(study, metric)
+    if mean:
+        expect_mean(metric, study.repeat)
     table, units = rows_at(frame(store), at), units_in(store)
     if not (table["status"] == "done").any():
         raise UsageError(f"{store}: expected at least one finished run, as sweep makes them")
@@ -86,8 +97,9 @@ def study_figures(
             drawn = {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}
         else:
             axes = tuple(axis for axis in study.cell_axes if axis.name not in at)
-            drawn = _over_axes(study, axes, table, metric, units, style)
-        notes = [place_of(study, at, units), "" if study.repeat is None else meaning_of(study, metric, units)]
+            drawn = _over_axes(study, axes, table, metric, units, style, MEAN if mean else MEDIAN)
+        meaning = "" if study.repeat is None or mean else meaning_of(study, metric, units)
+        notes = [place_of(study, at, units), meaning]
         for figure in drawn.values():
             figures.add_note(figure, "; ".join(filter(None, notes)), style)
     return drawn, indices
@@ -100,6 +112,7 @@ def _over_axes(
     metric: str,
     units: Mapping[str, str],
     style: Style,
+    average: str,
 ) -> dict[str, Figure]:
     system = study.origin
     words = system.criterion.outcomes
@@ -120,11 +133,12 @@ def _over_axes(
         if metric in BOOLEAN:
             table, of = judged_by(table, metric), GOOD
             words = words if metric == GOOD else (labels.metric(metric), f"not {labels.metric(metric)}")
-        else:
+        elif average == MEDIAN:
             _expect_value(study, table, metric)
+        look: dict[str, Any] = {"units": units, "style": style, "average": average}
         if len(axes) == 1:
-            return {metric: cell_lines(table, axes[0], panels, of, words, units=units, style=style)}
-        return {f"{metric}_map": cell_maps(table, (axes[0], axes[1]), panels, of, words, units=units, style=style)}
+            return {metric: cell_lines(table, axes[0], panels, of, words, **look)}
+        return {f"{metric}_map": cell_maps(table, (axes[0], axes[1]), panels, of, words, **look)}
     if len(axes) > 2:
         drawn = {metric: figures.scatter(table, axes, metric, words, units=units, style=style)}
         if len(axes) == 3 and fits and system.criterion.good is not None:
@@ -148,7 +162,7 @@ def _expect_value(study: Study, table: "pd.DataFrame", metric: str) -> None:
     raise UsageError(
         f"metric {metric}: expected a {word} run with a value of it, over which cells have medians; there are "
         f"{how_runs_ended(outcomes, len(table))} by {study.origin.stop_time:g} s: try the shares (--metric good, "
-        "--metric diverged), or a longer stop_time"
+        "--metric diverged), the mean over all runs with a value (--mean), or a longer stop_time"
     )
 
 

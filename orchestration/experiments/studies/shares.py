@@ -1,4 +1,4 @@
-"""Cells of a study: the share of its repetitions that are good, with its interval, and the median of a metric."""
+"""Cells of a study: the share of its repetitions that are good, and the median or mean of a metric, with intervals."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.statistics import pair_correlation, quantile, wilson
+from orchestration.foundation.basics.statistics import mean, pair_correlation, quantile, wilson
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,11 +18,25 @@ GOOD = "good"
 BOOLEAN = (GOOD, "diverged")
 """Metrics of which cells have the share of the runs, of all, for which they are true; of others medians"""
 WITH_VALUE = "with_value"
-"""Column of medians: the number of good runs that have the metric, as those that settle have a settling time"""
+"""Column of averages: the number of good runs that have the metric, as those that settle have a settling time"""
+MEDIAN, MEAN = "median", "mean"
+"""Averages of a metric, and their columns: the median over the good runs, the mean over all that have the metric"""
+INTERVALS = {MEDIAN: "of order statistics", MEAN: "by Student's t"}
+"""What their intervals at 95 % are"""
+PLACE = "place"
+"""Column of one value, by which runs over laws alone are one group"""
 RANDOM = "random"
 """Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
 PAIR = "paired by"
 """Column of a table of runs: what runs of two cells that belong together have in common, as the seed"""
+
+
+class TwoLaws(NamedTuple):
+    """The two values of an axis of names, in the order of the runs."""
+
+    axis: str
+    first: str
+    second: str
 
 
 def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
@@ -42,8 +56,39 @@ def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
 
 
 def judged_by(table: "pd.DataFrame", metric: str) -> "pd.DataFrame":
-    """The table in which those runs are good for which a metric of `BOOLEAN` is true, for its shares."""
-    return table.assign(**{GOOD: table[metric]})
+    """The table in which those runs are good for which a metric of `BOOLEAN` is true, for its shares.
+
+    Of another metric, for its mean, those that have it.
+    """
+    return table.assign(**{GOOD: table[metric] if metric in BOOLEAN else table[metric].notna()})
+
+
+def expect_mean(metric: str | None, repeat: str | None) -> None:
+    """Raise `UsageError` where a metric has no mean in cells."""
+    if metric in (None, "outcome", *BOOLEAN) or repeat is None:
+        raise UsageError(
+            "mean: expected a metric that is a number, such as position_rmse, of a study with design.repeat; "
+            "good and diverged have shares"
+        )
+
+
+def cells_of(table: "pd.DataFrame", by: Sequence[str], metric: str, average: str = MEDIAN) -> "pd.DataFrame":
+    """The share, of a metric of `BOOLEAN`, else the average in each cell, of a table that is `with_chance`."""
+    if metric in BOOLEAN:
+        return shares_of(judged_by(table, metric), by).rename(columns={GOOD: metric})
+    return averages_of(table, by, metric, average)
+
+
+def differences_in(
+    table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws, metric: str, average: str = MEDIAN
+) -> "pd.DataFrame":
+    """Likewise of the second law minus the first."""
+    if [*by] == [laws.axis]:
+        every = differences_in(table.assign(**{PLACE: 0}), [*by, PLACE], laws, metric, average)
+        return every.drop(columns=PLACE)
+    if metric in BOOLEAN:
+        return differences_of(judged_by(table, metric), by, laws)
+    return differences_of_averages(table, by, laws, metric, average)
 
 
 def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
@@ -55,9 +100,7 @@ def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    done = table[table["status"] == "done"]
-    if done["good"].isna().any():
-        raise UsageError("expected criterion.good in the base, which says what a good run is")
+    done = _judged(table)
     counted = done.assign(count=1, good=done["good"].astype(int))
     cells = counted.groupby([*by], sort=False).agg(count=("count", "sum"), good=("good", "sum"), random=(RANDOM, "any"))
     cells = cells.reset_index()
@@ -70,6 +113,14 @@ def shares_of(table: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     cells.loc[alike, "good"], cells.loc[alike, "count"] = cells.loc[alike, "share"].astype(int), 1
     cells[["low", "high"]] = pd.DataFrame(intervals, index=cells.index, columns=["low", "high"], dtype=float)
     return cells[[*by, "count", "good", "share", "low", "high"]]
+
+
+def _judged(table: "pd.DataFrame") -> "pd.DataFrame":
+    """The finished runs; raises `UsageError` if no criterion says which are good."""
+    done = table[table["status"] == "done"]
+    if done[GOOD].isna().any():
+        raise UsageError("expected criterion.good in the base, which says what a good run is; means need none (--mean)")
+    return done
 
 
 def interval_of_difference(
@@ -95,14 +146,6 @@ def interval_of_difference(
 def _apart(one: float, other: float, correlation: float) -> float:
     """The third side of a triangle with these two, whose angle has that cosine."""
     return math.sqrt(one * one - 2.0 * correlation * one * other + other * other)
-
-
-class TwoLaws(NamedTuple):
-    """The two values of an axis of names, in the order of the runs."""
-
-    axis: str
-    first: str
-    second: str
 
 
 def laws_of(table: "pd.DataFrame", by: Sequence[str]) -> TwoLaws | None:
@@ -132,55 +175,68 @@ def differences_of(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws) -> "
     return pd.DataFrame(rows, columns=[*others, "difference", "low", "high"])
 
 
-def medians_of(table: "pd.DataFrame", by: Sequence[str], metric: str) -> "pd.DataFrame":
-    """The median of a metric over the good runs of each cell.
+def averages_of(table: "pd.DataFrame", by: Sequence[str], metric: str, average: str = MEDIAN) -> "pd.DataFrame":
+    """The median of a metric over the good runs of each cell, or its mean over all runs that have it.
 
-    Columns: the axes `by`, `good`, the number of those runs, `with_value`, of those that have the metric, `median`, and
-    the interval of order statistics at 95 %, `low` and `high`, nan where there are too few runs, and where nothing is
-    random, which is one run.
+    Columns: the axes `by`, `count` of runs, also failed ones, `diverged` and `good` of them (for the mean those that
+    have it), `with_value`, the number of those averaged, `median` or `mean`, and the ends of its interval at 95 %, of
+    order statistics or Student's t, nan where there are too few runs, and where nothing is random, which is one run.
     """
     import pandas as pd
 
-    done = table[table["status"] == "done"]
+    judged = table if average == MEDIAN else judged_by(table, metric)
+    good = _judged(judged)[GOOD].astype(bool)
+    table = table.assign(averaged=good.reindex(table.index, fill_value=False))
     rows = []
-    for key, cell in done.groupby([*by], sort=False):
-        values, is_random = cell.loc[cell["good"].fillna(False).astype(bool), metric], bool(cell[RANDOM].any())
-        good = len(values) if is_random else min(1, len(values))
-        rows.append((*key, good, *_median(values.dropna(), is_random=is_random)))
-    return pd.DataFrame(rows, columns=[*by, "good", WITH_VALUE, "median", "low", "high"])
+    for key, cell in table.groupby([*by], sort=False):
+        values, is_random = cell.loc[cell["averaged"], metric], bool(cell[RANDOM].any())
+        counts = [len(cell), int(cell["diverged"].fillna(False).sum()), len(values)]
+        counts = counts if is_random else [min(1, each) for each in counts]
+        rows.append((*key, *counts, *_average(values.dropna(), average, is_random=is_random)))
+    return pd.DataFrame(rows, columns=[*by, "count", "diverged", GOOD, WITH_VALUE, average, "low", "high"])
 
 
-def without_value(medians: "pd.DataFrame") -> str:
-    """What a caption says of good runs that lack the metric, with their number; empty without such runs."""
-    missing = int((medians["good"] - medians[WITH_VALUE]).sum())
-    return f"{missing} good run{'s' if missing > 1 else ''} without a value left out" if missing else ""
+def left_out(averages: "pd.DataFrame", word: str) -> str:
+    """What a caption says of the runs that are not averaged, with their number; empty without such runs.
+
+    `word` is the name of a good run, of which medians are.
+    """
+    count, missing, diverged = (
+        int(each.sum()) for each in (averages["count"], averages["count"] - averages[WITH_VALUE], averages["diverged"])
+    )
+    why = f"not {word}, or without a value" if MEDIAN in averages else "without a value"
+    which = f", {'all' if diverged == missing else diverged} of them diverged" if diverged else ""
+    return f"{missing} of {count} runs left out ({why}){which}" if missing else ""
 
 
-def _median(values: "pd.Series", *, is_random: bool) -> tuple[int, float, float, float]:
-    """The number of values, their median, and the ends of its interval at 95 %."""
+def _average(values: "pd.Series", average: str, *, is_random: bool) -> tuple[int, float, float, float]:
+    """The number of values, their median or mean, and the ends of its interval at 95 %."""
     if not len(values):
         return 0, math.nan, math.nan, math.nan
-    found = quantile(values.to_numpy(float))
+    found = (quantile if average == MEDIAN else mean)(values.to_numpy(float))
     low, high = (end if is_random and math.isfinite(end) else math.nan for end in (found.low, found.high))
     return len(values) if is_random else 1, found.value, low, high
 
 
-def differences_of_medians(table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws, metric: str) -> "pd.DataFrame":
-    """The median of a metric of the second law minus that of the first, over the pairs in which both are good.
+def differences_of_averages(
+    table: "pd.DataFrame", by: Sequence[str], laws: TwoLaws, metric: str, average: str = MEDIAN
+) -> "pd.DataFrame":
+    """The median or mean of a metric of the second law minus that of the first, over pairs, as with the same seed.
 
-    Columns: the other axes, `pairs`, the number of those in which both have the metric, `difference`, and the interval
-    of order statistics at 95 %, `low` and `high`, nan where there are too few pairs, and where nothing is random, which
-    is one pair.
+    Pairs are those in which both are good, for the mean those in which both have the metric. Columns: the other axes,
+    `pairs`, their number, `difference`, and its interval at 95 %, `low` and `high`, nan where there are too few pairs,
+    and where nothing is random, which is one pair.
     """
     import pandas as pd
 
     others = [name for name in by if name != laws.axis]
-    good = table[(table["status"] == "done") & table["good"].fillna(False).astype(bool) & table[metric].notna()]
+    judged = table if average == MEDIAN else judged_by(table, metric)
+    good = _judged(judged).query(GOOD).dropna(subset=[metric])
     columns, rows = [*others, PAIR, metric, RANDOM], []
     one, other = (good.loc[good[laws.axis] == law, columns] for law in (laws.second, laws.first))
     for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others, sort=False):
         is_random = bool((both[RANDOM] | both[f"{RANDOM}.other"]).any())
-        rows.append((*key, *_median(both[metric] - both[f"{metric}.other"], is_random=is_random)))
+        rows.append((*key, *_average(both[metric] - both[f"{metric}.other"], average, is_random=is_random)))
     return pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high"])
 
 

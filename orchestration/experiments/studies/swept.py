@@ -68,15 +68,17 @@ class Swept:
         return html.card("A study", None, None, self._counts(), rows)
 
     @explains_missing
-    def plot(self, metric: str | None = None) -> "Figures":
+    def plot(self, metric: str | None = None, *, mean: bool = False) -> "Figures":
         """The figures of a metric over the axes, default: the first that varies; a notebook shows them.
+
+        With `mean` cells have its mean over all runs that have it, not the median over the good ones.
 
         Raises `UsageError` for an unknown metric, or axes for which there is no figure.
         """
         from orchestration.experiments.studies.drawing import study_figures
         from orchestration.simulation.figures.style import SCREEN, Figures
 
-        figures, _ = study_figures(self.study, self.path, metric, SCREEN)
+        figures, _ = study_figures(self.study, self.path, metric, SCREEN, mean=mean)
         return Figures(figures, SCREEN)
 
     @explains_missing
@@ -89,18 +91,39 @@ class Swept:
         return table
 
     @explains_missing
-    def shares(self) -> "pd.DataFrame":
+    def shares(self, metric: str = "good", *, mean: bool = False) -> "pd.DataFrame":
         """A row for each combination of the axes but `repeat`: `count` of runs, `good`, their `share`, `low`, `high`.
 
-        The interval is Wilson's at 95 %, nan where nothing is random. Raises `UsageError` if the study has no axis that
-        repeats, or no criterion.
+        Also of `diverged`; of another metric its median over the good runs or, with `mean`, its mean over all that have
+        it. Intervals at 95 % are Wilson's, of order statistics, or Student's t, nan where nothing is random. Raises
+        `UsageError` if the study has no axis that repeats, for an unknown metric, and without a criterion.
         """
-        from orchestration.experiments.studies.shares import shares_of, with_chance
-        from orchestration.experiments.studies.table import frame
+        from orchestration.experiments.studies.shares import cells_of
 
-        if self.study.cell_names is None:
-            raise UsageError("design.repeat: expected the name of the axis that repeats each cell, as seed")
-        return shares_of(with_chance(frame(self.path), self.study), self.study.cell_names)
+        return cells_of(*self._cells(metric, mean=mean))
+
+    @explains_missing
+    def differences(self, metric: str = "good", *, mean: bool = False) -> "pd.DataFrame":
+        """Likewise of two laws the second minus the first, over pairs, as of one seed: `difference`, `low`, `high`.
+
+        Intervals of shares are Newcombe's for pairs. Raises `UsageError` also if the study has not two laws.
+        """
+        from orchestration.experiments.studies.shares import differences_in, laws_of
+
+        table, by, metric, average = self._cells(metric, mean=mean)
+        laws = laws_of(table, by)
+        if laws is None:
+            raise UsageError("differences: expected one axis of two names, such as two controllers")
+        return differences_in(table, by, laws, metric, average).assign(law=laws.second, minus=laws.first)
+
+    def _cells(self, metric: str, *, mean: bool) -> "tuple[pd.DataFrame, tuple[str, ...], str, str]":
+        from orchestration.experiments.studies.shares import MEAN, MEDIAN, expect_mean, with_chance
+        from orchestration.experiments.studies.table import expect_metric_of_cells, frame
+
+        expect_metric_of_cells(self.study, metric)
+        if mean:
+            expect_mean(metric, self.study.repeat)
+        return with_chance(frame(self.path), self.study), self.study.cell_names or (), metric, MEAN if mean else MEDIAN
 
     @explains_missing
     def to_xarray(self) -> "xr.Dataset":

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 FORMATS = ("parquet", "csv", "mat")
-TABLES = ("runs", "shares", "shares_*", "medians_*", "differences", "differences_*")
+TABLES = ("runs", "shares", "shares_*", "medians_*", "means_*", "differences", "differences_*")
 """Patterns of the names of the files that `export` writes"""
 
 SHARED = (*TEXTS, "status", "machine", "engine")
@@ -149,6 +149,7 @@ def export(
     *,
     rows: "pd.DataFrame | None" = None,
     metric: str | None = None,
+    average: str = shares.MEDIAN,
 ) -> list[Path]:
     """Write the rows by design index as `runs.parquet`, `runs.csv` or `runs.mat`; their paths.
 
@@ -156,7 +157,8 @@ def export(
 
     Of a `study` with cells also the share of good runs of each as `shares`, likewise, and of two laws those of the
     second minus those of the first, as `differences`; of a `metric` its medians, as `medians_METRIC`, and of two laws
-    those of its differences in pairs, as `differences_METRIC`; of one that is true or false, as `diverged`, its shares
+    those of its differences in pairs, as `differences_METRIC`; or its means, as `means_METRIC` and
+    `differences_mean_METRIC`; of one that is true or false, as `diverged`, its shares
     likewise, as `shares_METRIC`. Parquet has units in the metadata of its fields, as `unit`; MAT has a structure `runs`
     with a field for each column, and `units` with the same fields.
     """
@@ -167,20 +169,16 @@ def export(
     if study is not None and study.cell_names is not None:
         cells, repeated = study.cell_names, shares.with_chance(rows, study)
         laws = shares.laws_of(rows, cells)
-        for name in dict.fromkeys((shares.GOOD, metric or shares.GOOD)):
-            end, unit, judged = "" if name == shares.GOOD else f"_{name}", units.get(name, ""), repeated
-            if is_share := name in shares.BOOLEAN:
-                judged = shares.judged_by(repeated, name)
-                tables[f"shares{end}"] = shares.shares_of(judged, cells).rename(columns={shares.GOOD: name})
-            else:
-                tables[f"medians{end}"] = shares.medians_of(repeated, cells, name).assign(unit=unit)
+        judged = (shares.GOOD,) if study.origin.criterion.good is not None else ()
+        for name in dict.fromkeys((*judged, *filter(None, (metric,)))):
+            end, is_share = "" if name == shares.GOOD else f"_{name}", name in shares.BOOLEAN
+            unit = {} if is_share else {"unit": units.get(name, "")}
+            kind = "shares" if is_share else f"{average}s"
+            tables[f"{kind}{end}"] = shares.cells_of(repeated, cells, name, average).assign(**unit)
             if laws is not None:
-                found = (
-                    shares.differences_of(judged, cells, laws)
-                    if is_share
-                    else shares.differences_of_medians(repeated, cells, laws, name).assign(unit=unit)
-                )
-                tables[f"differences{end}"] = pd.DataFrame({"law": laws.second, "minus": laws.first, **found})
+                found = shares.differences_in(repeated, cells, laws, name, average).assign(**unit)
+                of = "_mean" if kind == "means" else ""
+                tables[f"differences{of}{end}"] = pd.DataFrame({"law": laws.second, "minus": laws.first, **found})
     written = []
     with new_files(folder) as new:
         for name, content in tables.items():
@@ -230,16 +228,21 @@ def of_study(
     metric: str | None = None,
     *,
     out: Path | None = None,
+    mean: bool = False,
 ) -> list[Path]:
     """Write the rows of a store to `out`, default: beside it, and as Parquet and CSV; the paths.
 
-    Of a `study` with cells also the share of good runs of each, and the median of a `metric`, with intervals.
+    Of a `study` with cells also the share of good runs of each, and the median or mean of a `metric`, with
+    intervals.
     """
     for kind in formats:
         _expect(kind, FORMATS)
     if metric is not None:
         expect_metric_of_cells(study, metric)
-    written = export(store, out or store.parent, formats or FORMATS[:2], study, metric=metric)
+    if mean:
+        shares.expect_mean(metric, None if study is None else study.repeat)
+    average = shares.MEAN if mean else shares.MEDIAN
+    written = export(store, out or store.parent, formats or FORMATS[:2], study, metric=metric, average=average)
     if old := _older(written, store):
         inform(
             f"{', '.join(old)}: older than the store, of fewer runs or an earlier design; {written[0].parent} keeps "
@@ -257,10 +260,10 @@ def _older(written: Sequence[Path], store: Path) -> list[str]:
 def expect_metric_of_cells(study: Study | None, metric: str) -> None:
     """Raise `UsageError` for a metric that is a text, and for a study without cells."""
     if study is None or study.cell_names is None:
-        raise UsageError(f"--metric {metric}: {OF_CELLS}")
+        raise UsageError(f"metric {metric}: {OF_CELLS}")
     known = [name for name in metrics_with(study.metric_names) if name not in TEXTS]
     if metric not in known:
-        raise UsageError(f"--metric {metric}: {expected_name(metric, known)}")
+        raise UsageError(f"metric {metric}: {expected_name(metric, known)}")
 
 
 OF_CELLS = "expected a study file whose design.repeat has the name of the axis that repeats, as seed"

@@ -1,8 +1,8 @@
-"""Confidence intervals and tests of shares and quantiles."""
+"""Confidence intervals and tests of shares, quantiles and means."""
 
 import math
 from collections.abc import Iterable, Sequence
-from statistics import NormalDist
+from statistics import NormalDist, fmean
 from typing import NamedTuple
 
 from orchestration.foundation.basics.errors import UsageError
@@ -42,7 +42,7 @@ def pair_correlation(both: int, only_one: int, only_other: int, neither: int) ->
 
 
 class Estimate(NamedTuple):
-    """An estimated quantile or share."""
+    """An estimated quantile, mean or share."""
 
     value: float
     low: float
@@ -79,6 +79,18 @@ def quantile(values: Sequence[float], share: float = 0.5, confidence: float = 0.
         high=ordered[last] if last < n else math.inf,
         confidence=1.0 - below - above,
     )
+
+
+def mean(values: Sequence[float], confidence: float = 0.95) -> Estimate:
+    """The mean, with Student's t interval, which is infinite of a single value; raises `UsageError` for no values."""
+    from scipy.special import stdtrit
+
+    if not len(values):
+        raise UsageError("mean of 0 values: expected some")
+    middle, n = fmean(values), len(values)
+    apart = math.fsum((value - middle) ** 2 for value in values)
+    half = float(stdtrit(n - 1, 0.5 + 0.5 * confidence)) * math.sqrt(apart / (n - 1) / n) if n > 1 else math.inf
+    return Estimate(value=middle, low=middle - half, high=middle + half, confidence=confidence)
 
 
 def _binomial(k: int, n: int, share: float) -> float:

@@ -22,11 +22,13 @@ from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
     PAIR,
     TwoLaws,
+    averages_of,
+    differences_in,
     differences_of,
-    differences_of_medians,
+    differences_of_averages,
+    expect_mean,
     interval_of_difference,
     judged_by,
-    medians_of,
     shares_of,
     with_chance,
 )
@@ -52,7 +54,7 @@ def runs() -> pd.DataFrame:
     rows = [
         {
             "controller": law, "timing.period": period, "timing.loss": loss, "seed": seed, "status": "done",
-            "random": True, PAIR: seed, "good": first or (period < 0.02 and seed < 3 * k),
+            "random": True, PAIR: seed, "diverged": False, "good": first or (period < 0.02 and seed < 3 * k),
             "position_rmse": 1.0 + seed,
         }
         for law, first in zip(LAWS.values or (), (True, False))
@@ -82,7 +84,7 @@ def test_a_metric_that_is_true_or_false_has_its_share_of_all_runs() -> None:
 def test_a_metric_of_a_cell_is_its_median_over_the_good_runs_and_failed_runs_do_not_count() -> None:
     table = runs()
     table.loc[0, ["status", "good"]] = ["failed", pd.NA]
-    cells = medians_of(table, ["controller", "timing.period", "timing.loss"], "position_rmse").set_index(
+    cells = averages_of(table, ["controller", "timing.period", "timing.loss"], "position_rmse").set_index(
         ["controller", "timing.period", "timing.loss"]
     )
     assert cells.loc[("CascadedController", 0.01, 0.1), "median"] == 2.0
@@ -95,20 +97,51 @@ def test_good_runs_without_the_metric_are_left_out_and_counted_as_such_in_map_li
     table = runs().query("controller == 'CascadedController'")
     lacks = (table["timing.loss"] == 0.1) | ((table["timing.loss"] == 0.2) & (table["seed"] == 5))
     table = table.assign(position_rmse=table["position_rmse"].mask(lacks))
-    medians = medians_of(table, names, "position_rmse")
+    medians = averages_of(table, names, "position_rmse")
     assert medians[["good", "with_value"]].to_numpy().tolist() == [[0, 0], [3, 0], [6, 5], [0, 0], [0, 0], [0, 0]]
-    assert study_table._medians(medians, "median", "with_value")[:3] == ["-", "- (0 of 3)", "3.00 (5 of 6)"]
+    texts = study_table._averages(medians, "median", "with_value")
+    assert texts[:3] == ["- (0 of 8)", "- (0 of 8)", "3.00 (5 of 8)"]
     one_law = axis("controller", "CascadedController")
     figure = cell_maps(table, (PERIODS, LOSSES), one_law, "position_rmse", WORDS, units={})
-    assert [text.get_text() for text in figure.axes[0].texts] == ["5"]
-    assert figure.get_suptitle() == "8 runs a cell; 4 good runs without a value left out"
+    assert [text.get_text() for text in figure.axes[0].texts] == ["5/8"]
+    assert figure.get_suptitle() == "8 runs a cell; 43 of 48 runs left out (not settled, or without a value)"
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["half of the runs settled", "none settled, or no value"]
     figure = cell_lines(table, LOSSES, one_law, "position_rmse", WORDS, units={})
-    assert [text.get_text() for text in figure.axes[0].texts] == ["5"]
-    assert "; 4 good runs without a value" in figure.get_suptitle()
+    assert [text.get_text() for text in figure.axes[0].texts] == ["5/16"]
+    assert "; 43 of 48 runs left out (not" in figure.get_suptitle()
     assert crosses_of(figure) == [0.0, 0.1]
     assert figure.get_suptitle().replace("\n", " ").endswith("with a value by CascadedController at 0, 0.1")
+
+
+def test_a_mean_is_over_all_runs_with_a_value_and_marks_where_some_are_left_out() -> None:
+    names, laws = ["controller", "timing.loss"], TwoLaws("controller", *map(str, LAWS.values or ()))
+    table = runs().query("`timing.period` == 0.02 and seed < 4").assign(good=False)  # 1, 2, 3, 4
+    table["diverged"] = (table["timing.loss"] == 0.1) & (table["seed"] == 3)
+    table["position_rmse"] = (table["position_rmse"] * (1 + (table["controller"] == laws.second))).mask(
+        table["diverged"]
+    )
+    means = averages_of(table, names, "position_rmse", "mean").set_index(names)
+    assert means.loc[laws.first, 0.0][["count", "diverged", "with_value", "mean"]].tolist() == [4, 0, 4, 2.5]
+    half = 3.182446305284263 * math.sqrt(
+        5.0 / 3.0 / 4.0
+    )  # the 97.5 % quantile of Student's t with 3 degrees of freedom
+    assert means.loc[laws.first, 0.0][["low", "high"]].tolist() == pytest.approx([2.5 - half, 2.5 + half])
+    assert means.loc[laws.first, 0.1][["count", "diverged", "with_value", "mean"]].tolist() == [4, 1, 3, 2.0]
+    pairs = differences_in(table, names, laws, "position_rmse", "mean").set_index("timing.loss")
+    assert pairs.loc[0.0].tolist() == pytest.approx([4, 2.5, 2.5 - half, 2.5 + half])
+    assert pairs.loc[0.1, ["pairs", "difference"]].tolist() == [3, 2.0]
+    alone = differences_in(table, names[:1], laws, "position_rmse", "mean")  # PAIR: seeds of all losses
+    assert alone.columns.tolist() == ["pairs", "difference", "low", "high"]
+    figure = cell_lines(table, LOSSES, LAWS, "position_rmse", WORDS, units={}, average="mean")
+    assert "; 2 of 24 runs left out (without a value), all of them diverged" in figure.get_suptitle().replace("\n", " ")
+    hollow = [line for line in figure.axes[0].get_lines() if line.get_markerfacecolor() == "white"]
+    assert [np.asarray(line.get_xdata()).tolist() for line in hollow] == [[0.1], [0.1], []]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["4", "3/4", "4"] * 2
+    figure = cell_maps(table, (PERIODS, LOSSES), LAWS, "position_rmse", WORDS, units={}, average="mean")
+    assert [text.get_text() for text in figure.axes[0].texts] == ["4", "3/4", "4"]
+    with pytest.raises(UsageError, match="mean: expected a metric that is a number"):
+        expect_mean("good", "seed")
 
 
 def crosses_of(figure: Figure) -> list[float]:
@@ -182,10 +215,10 @@ def test_the_interval_of_a_difference_of_two_laws_is_newcombes_for_pairs() -> No
     assert tuple(pairless.loc[(0.01, 0.1), ["low", "high"]]) == (low, high)
 
 
-def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good() -> None:
+def test_averages_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good() -> None:
     names, laws = ["controller", "timing.period", "timing.loss"], TwoLaws("controller", *map(str, LAWS.values or ()))
     table = runs().assign(position_rmse=lambda t: t["seed"] ** 2.0 * (t["controller"] == laws.second) + 5.0 * t["seed"])
-    found = differences_of_medians(table, names, laws, "position_rmse").set_index(["timing.period", "timing.loss"])
+    found = differences_of_averages(table, names, laws, "position_rmse").set_index(["timing.period", "timing.loss"])
     assert [*found.index] == [(0.01, 0.1), (0.01, 0.2)], "elsewhere none of the second law is good"
     assert found["pairs"].tolist() == [3, 6]
     assert found["difference"].tolist() == [1.0, 6.5], (
@@ -193,17 +226,17 @@ def test_medians_of_two_laws_differ_by_that_of_the_pairs_in_which_both_are_good(
     )
     assert found["low"].isna().tolist() == [True, False], "three pairs do not bound a median"
     assert tuple(found.loc[(0.01, 0.2), ["low", "high"]]) == (0.0, 25.0)
-    medians = medians_of(table, names, "position_rmse").set_index(names).sort_index().loc[laws.second, 0.01]
+    medians = averages_of(table, names, "position_rmse").set_index(names).sort_index().loc[laws.second, 0.01]
     assert medians["good"].tolist() == [0, 3, 6]
     assert medians["median"].tolist() == [pytest.approx(np.nan, nan_ok=True), 6.0, 19.0]
     assert medians.loc[0.2, ["low", "high"]].tolist() == [0.0, 50.0]
     assert medians.loc[0.1, ["low", "high"]].isna().all(), "three runs do not bound a median"
-    exact = differences_of_medians(table.assign(random=False), names, laws, "position_rmse")
+    exact = differences_of_averages(table.assign(random=False), names, laws, "position_rmse")
     assert exact["pairs"].tolist() == [1, 1]
     assert exact[["low", "high"]].isna().all(axis=None)
     figure = cell_maps(table.assign(position_rmse=table["position_rmse"] + 1.0 * (table["controller"] == laws.second)),
                        (PERIODS, LOSSES), LAWS, "position_rmse", WORDS, units={"position_rmse": "m"})  # fmt: skip
-    assert [text.get_text() for text in figure.axes[1].texts] == ["3", "6"]
+    assert [text.get_text() for text in figure.axes[1].texts] == ["3/8", "6/8"]
     assert [text.get_text() for text in figure.axes[2].texts] == ["+", "+", "3", "6"]
     assert [bar.get_xlabel() for bar in figure.axes[3:]][1] == "median difference [m],\nnumber of pairs"
     (marks,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
@@ -317,12 +350,12 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
 def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     figure = cell_lines(runs(), LOSSES, LAWS, "position_rmse", WORDS, units={}, style=STYLES["paper"])
     texts = figure.axes[0].texts
-    assert [text.get_text() for text in texts] == ["16", "16", "16", "3", "6"]
+    assert [text.get_text() for text in texts] == ["16", "16", "16", "3/16", "6/16"]
     heights = [text.get_position()[1] for text in texts]
     assert heights[0] == heights[2] > heights[3] == heights[4] > 0.9, "a row for each law, at the upper edge"
     assert (
         figure.axes[0].get_ylim()[1]
-        > 1.1 * medians_of(runs(), ["controller", "timing.loss"], "position_rmse")["high"].max()
+        > 1.1 * averages_of(runs(), ["controller", "timing.loss"], "position_rmse")["high"].max()
     )
     many = runs().assign(**{"timing.loss": range(len(runs()))})
     crowded = cell_lines(many, axis("timing.loss", *range(len(runs()))), LAWS, "position_rmse", WORDS, units={})
@@ -331,11 +364,11 @@ def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     assert figure.axes[0].get_ylabel().endswith("\nnumber of settled runs with a value")
     assert crosses_of(figure) == [0.0], "none of the second law is good there"
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == [*(LAWS.values or ()), "no value"]
+    assert [text.get_text() for text in legend.get_texts()] == [*(LAWS.values or ()), "no value", "some runs left out"]
     told = "; crosses: no settled run with a value by CascadedController at 0"
     assert str(figure.get_label()).endswith(told)
     first = next(iter(figure.axes[0].collections)).get_segments()[0]  # type: ignore[attr-defined]
-    low, high = medians_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[0, ["low", "high"]]
+    low, high = averages_of(runs(), ["controller", "timing.loss"], "position_rmse").loc[0, ["low", "high"]]
     assert first[:, 1].tolist() == [low, high], "the interval of the first place"
     assert not figure.get_suptitle()
     figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={}, style=STYLES["paper"])
@@ -376,7 +409,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
         assert "did you mean position_rmse?" in error
     main("export", "study.toml", "--format", "csv", "--metric", "position_rmse")
     medians = pd.read_csv(tmp_path / "results/study/medians_position_rmse.csv")
-    assert list(medians)[2:] == ["good", "with_value", "median", "low", "high", "unit"]
+    assert list(medians)[2:] == ["count", "diverged", "good", "with_value", "median", "low", "high", "unit"]
     assert set(medians["unit"]) == {"m"}
     of_medians = pd.read_csv(tmp_path / "results/study/differences_position_rmse.csv")
     assert list(of_medians)[3:] == ["pairs", "difference", "low", "high", "unit"]
@@ -386,6 +419,12 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert printed.splitlines()[-1] == "CascadedController,0.02,1,0,0.0,,,0.0,,,UnifiedController"
     of_diverged = pd.read_csv(tmp_path / "results/study/differences_diverged.csv")
     assert list(of_diverged)[3:] == ["difference", "low", "high"]
+    swept = quadcosim.sweep("study.toml")
+    assert swept.differences("diverged")["difference"].tolist() == of_diverged["difference"].tolist()
+    main("export", "study.toml", "--format", "csv", "--metric", "position_rmse", "--mean")
+    means = pd.read_csv(tmp_path / "results/study/means_position_rmse.csv")
+    assert swept.shares("position_rmse", mean=True)["mean"].tolist() == pytest.approx(means["mean"].tolist())
+    assert means["with_value"].tolist() == means["count"].tolist(), "none is good, but all have a value"
     main("draw", "study.toml", *of_store, "--metric", "diverged", "--out", "figures", "--format", "png")
     runs = pd.read_csv(tmp_path / "results/study/runs.csv")
     guids = {
