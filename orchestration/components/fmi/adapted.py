@@ -14,7 +14,6 @@ import numpy as np
 from orchestration.components.fmi.access import SCHEDULED, USUAL, Access, Interface
 from orchestration.components.fmi.fmi2 import Fmi2Instance
 from orchestration.components.fmi.fmi3 import Fmi3Instance, StepsWithEnd
-from orchestration.components.fmi.instance import start_number
 from orchestration.components.fmi.read_description import Model
 from orchestration.components.fmi.slaves import WARNING
 from orchestration.components.fmi.transfers import Numbers
@@ -145,8 +144,7 @@ class AdaptedInstance(StepsWithEnd):
             kind = self.enumerations if variable.type == "Enumeration" else variable.type
             if not clocks or variable.causality not in ("output", "local") or kind not in kinds:
                 continue
-            elements = [v for v in self.variables.values() if v.whole == variable.name]
-            starts = np.array([start_number(v) for v in elements]).astype(self.stored[variable.type])
+            starts = self._layout.start_values(variable.name)
             self._clocked.append((starts, starts.copy()))
             table.append((numbers[kind], variable.valueReference, len(starts), clocks, address(self._clocked[-1][1])))
         self._table = (_types()["Clocked"] * len(table))(*table)

@@ -17,6 +17,7 @@ from orchestration.components.fmi.read_description import (
     attributes_of,
     clocks_of,
     declared_of,
+    items_text,
 )
 from orchestration.foundation.basics.terminal import in_columns
 from orchestration.foundation.basics.unit_algebra import time_text
@@ -166,7 +167,7 @@ def _ticks(clock: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _row(v: DeclaredVariable) -> tuple[str, ...]:
     kind = v.type + (f"[{','.join(map(str, v.dimensions))}]" if v.dimensions else "")
-    kind += f" ({', '.join(v.choices)})" if v.choices else ""
+    kind += f" ({items_text(v.choices)})" if v.choices else ""
     ends = ("-inf" if v.minimum is None else v.minimum, "inf" if v.maximum is None else v.maximum)
     limits = "" if v.minimum is None and v.maximum is None else " to ".join(ends)
     return v.name, v.causality, v.variability, kind, v.unit or "", v.start or "", limits, v.description or ""

@@ -33,6 +33,10 @@ NO_STATE = (
 """The words about an FMU whose state is to be saved, but cannot be"""
 
 
+A_FLOAT = "a whole number that a float holds: all are up to 2**53"
+"""What is expected of a number on its way through a run"""
+
+
 def convert_value(variable: Variable, value: object, place: str) -> Value:
     """Convert `value` to the type of the variable, an item of an enumeration to its number.
 
@@ -58,7 +62,7 @@ def _of_its_type(variable: Variable, value: object, place: str) -> Value:
         bounds = np.iinfo(INTEGERS[variable.type])
         fits = isinstance(value, int) and not isinstance(value, bool) and bounds.min <= value <= bounds.max
         whole = _if(fits, value, place, f"a whole number of {bounds.bits} bits")
-        return _if(int(float(whole)) == whole, whole, place, "a whole number that a float holds: all are up to 2**53")
+        return _if(float(whole) == whole, whole, place, A_FLOAT)
     if variable.kind != "Real":
         raise UsageError(f"{place}: is a {variable.kind}, which cannot be set")
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and _is_float(value)

@@ -92,6 +92,9 @@ class NativeInstance(Instance):
     only_calls: ClassVar[bool]
     """Stated by each class that does no more than call functions by their addresses, so that C can do so"""
 
+    reads_exactly = True
+    """Whether no number that it reads is rounded; else the nearest float is enough, to compare runs"""
+
     # -- what differs between versions ---------------------------------------------------------------------------
 
     version: ClassVar[int]
@@ -195,17 +198,25 @@ class NativeInstance(Instance):
     # -- values --------------------------------------------------------------------------------------------------
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
-        """A call that writes the values of the variables `names` to `into`; a Boolean is 0 or 1."""
+        """A call that writes the values of the variables `names` to `into`; a Boolean is 0 or 1.
+
+        With `reads_exactly` it raises `SimulatorError` for a whole number that no float is.
+        """
         parts = self._layout.parts(names, into)
-        calls = [(self._transfer(self._access("Get", x.type), x.references, x.buffer), x) for x in parts]
+        calls = [
+            (self._transfer(self._access("Get", x.type), x.references, x.buffer), x, [names[i] for i in x.array_places])
+            for x in parts
+        ]
         if len(parts) == 1 and parts[0].buffer is into:
             return self._registered(calls[0][0], "Get", parts, into)
 
         def read() -> None:
-            for call, part in calls:
+            for call, part, of in calls:
                 call()
                 values = part.buffer[part.places]
                 into[part.array_places] = values != 0 if part.type == "Boolean" else values
+                if self.reads_exactly:
+                    self._layout.expect_floats(of, values)
 
         return self._registered(read, "Get", parts, into)
 

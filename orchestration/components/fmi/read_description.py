@@ -105,6 +105,11 @@ class Variable:
         return self.variability == "constant" and self.causality == "local" and self.start is not None
 
 
+def items_text(choices: Mapping[str, int]) -> str:
+    """The items of an Enumeration with the numbers that files have of them."""
+    return ", ".join(f"{number} = {item}" for item, number in choices.items())
+
+
 @dataclass(frozen=True, kw_only=True)
 class DeclaredClock:
     """A clock; an input clock that is periodic is one that the importer makes tick."""

@@ -43,7 +43,9 @@ class _Runs:
 
     def open(self) -> NativeInstance:
         """A new instance."""
-        return open_here(self._path, "repeated", self._access)
+        instance = open_here(self._path, "repeated", self._access)
+        instance.reads_exactly = False
+        return instance
 
     def reference_run(self, instance: NativeInstance, beside: Callable[[float, float], None] | None = None) -> bytes:
         """The run that must repeat: all values of all steps."""

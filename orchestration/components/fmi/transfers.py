@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.components.fmi.instance import number_of
+from orchestration.components.fmi.instance import A_FLOAT, number_of
 from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.foundation.basics.errors import SimulatorError
 from orchestration.foundation.basics.simulator import Floats
@@ -81,6 +81,14 @@ class TransferLayout:
 
         return held
 
+    def expect_floats(self, names: Sequence[str], values: Numbers) -> None:
+        """Raise `SimulatorError` for a whole number that no float is."""
+        if values.dtype in (np.int64, np.uint64):
+            for name, number in zip(names, values.tolist()):
+                if float(number) != number:
+                    without = "it runs where this is neither recorded nor connected"
+                    raise SimulatorError(f"{self._name}.{name} = {number}: expected {A_FLOAT}; {without}")
+
     def _part(
         self, array: Floats, group: list[tuple[int, Variable]], reference: int | None, shared: dict[int, Numbers] | None
     ) -> TransferPart:
@@ -100,17 +108,19 @@ class TransferLayout:
         elif reference is None or shared is None:
             buffer = np.zeros(length, dtype=self._stored[first.type])
         else:
-            buffer = shared.setdefault(reference, self._start_values(first))
+            buffer = shared.setdefault(reference, self.start_values(first.whole))
         return TransferPart(
             type=first.type, references=references, buffer=buffer, array_places=array_places, places=places
         )
 
-    def _start_values(self, element: Variable) -> Numbers:
-        """Those of all elements of the array that an element is of."""
-        values = np.zeros(element.length, dtype=self._stored[element.type])
-        for variable in self._model.variables.values():
-            if variable.reference == element.reference and variable.start is not None:
-                values[variable.element] = number_of(variable, variable.start)
+    def start_values(self, whole: str) -> Numbers:
+        """Those of a variable, of an array all, with all digits; zero where none is declared."""
+        elements = [variable for variable in self._model.variables.values() if variable.whole == whole]
+        values = np.zeros(len(elements), dtype=self._stored[elements[0].type])
+        for v in elements:
+            text = v.start or "0"
+            digits = v.kind == "Integer" and text.lstrip("-").isdigit()
+            values[v.element] = int(text) if digits else number_of(v, text)
         return values
 
     def _variable(self, name: str) -> Variable:

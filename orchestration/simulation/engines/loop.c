@@ -83,6 +83,13 @@ static void into(const Part *part, int64_t i, double x) {
 
 static int whole(const Part *part) { return part->type >= INT8 && part->type <= UINT64; }
 
+/* Whether `x` is the value of a part, not one that is rounded. */
+static int is_exact(const Part *part, int64_t i, double x) {
+    if (part->type == INT64) return x <= part->high && (int64_t)x == ((const int64_t *)part->buffer)[i];
+    if (part->type == UINT64) return x <= part->high && (uint64_t)x == ((const uint64_t *)part->buffer)[i];
+    return 1;
+}
+
 /* Whether the type of a part holds a number. */
 static int holds(const Part *part, double x) {
     if (whole(part)) x = rint(x);
@@ -100,13 +107,20 @@ static int call(Loop *l, const Part *part) {
     return FAILED;
 }
 
+static int refuse(Loop *l, const Part *part) {
+    l->failed = part, l->component = part->component;
+    return REFUSED;
+}
+
 static int read_all(Loop *l, const Transfer *transfer) {
     for (int64_t i = 0; i < transfer->count; i++) {
         const Part *part = &transfer->parts[i];
         int code = call(l, part);
         if (code) return code;
-        if (part->asked)
-            for (int64_t j = 0; j < part->size; j++) transfer->array[part->asked[j]] = from(part, part->places[j]);
+        for (int64_t j = 0; part->asked && j < part->size; j++) {
+            double x = transfer->array[part->asked[j]] = from(part, part->places[j]);
+            if (!is_exact(part, part->places[j], x)) return refuse(l, part);
+        }
     }
     return 0;
 }
@@ -115,12 +129,8 @@ static int write_all(Loop *l, const Transfer *transfer) {
     for (int64_t i = 0; i < transfer->count; i++) {
         const Part *part = &transfer->parts[i];
         if (part->asked) {
-            for (int64_t j = 0; j < part->size; j++) {
-                if (!holds(part, transfer->array[part->asked[j]])) {
-                    l->failed = part, l->component = part->component;
-                    return REFUSED;
-                }
-            }
+            for (int64_t j = 0; j < part->size; j++)
+                if (!holds(part, transfer->array[part->asked[j]])) return refuse(l, part);
             for (int64_t j = 0; j < part->size; j++) {
                 double x = transfer->array[part->asked[j]];
                 into(part, part->places[j], whole(part) ? rint(x) : x);

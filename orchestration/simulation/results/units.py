@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypeAlias
 
-from orchestration.components.fmi.read_description import Model
+from orchestration.components.fmi.read_description import Model, items_text
 from orchestration.foundation.basics.errors import prefixed
 from orchestration.foundation.basics.unit_algebra import METRE, NUMBER, SECOND, Operand, Unit, agreed
 from orchestration.systems.expressions import syntax
@@ -133,7 +133,7 @@ class ColumnInfo:
     unit: str | None = None
     """Unit as FMI writes it, N.m for instance"""
     text: str | None = None
-    """the FMU's description"""
+    """the FMU's description, with the items of an Enumeration"""
 
     def as_metadata(self) -> dict[str, str]:
         """Those that exist, by `unit` and `description`, as in the metadata of a Parquet column."""
@@ -162,4 +162,7 @@ def column_infos(system: System, models: Mapping[str, Model], columns: Iterable[
 
 def _of(models: Mapping[str, Model], signal: str) -> ColumnInfo:
     variable = models[component_of(signal)].variables.get(variable_of(signal))
-    return ColumnInfo() if variable is None else ColumnInfo(unit=variable.unit, text=variable.description)
+    if variable is None:
+        return ColumnInfo()
+    text = ": ".join(filter(None, (variable.description, items_text(variable.choices))))
+    return ColumnInfo(unit=variable.unit, text=text or None)

@@ -11,7 +11,6 @@ from fmpy.util import write_csv
 from fmu_kit.new_files import new_file
 from orchestration.components.fmi.instance import INTEGERS
 from orchestration.components.fmi.read_description import Model
-from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.runs.result import Result
 
 _TYPES: dict[str, Any] = {
@@ -41,14 +40,5 @@ def table(result: Result, model: Model, names: Sequence[str]) -> npt.NDArray[Any
     for name in ordered:
         elements = [v.name for v in model.variables.values() if v.whole == name]
         values = np.column_stack([result.signals[f"{component}.{element}"] for element in elements])
-        filled[name] = _in_type(values, filled[name].dtype).reshape(filled[name].shape)
+        filled[name] = values.astype(filled[name].dtype).reshape(filled[name].shape)
     return filled
-
-
-def _in_type(values: Floats, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
-    """Recorded floats in the type of their variable: the float of the largest integer of 64 bits is one too large."""
-    if dtype.kind not in "iu":
-        return values.astype(dtype)
-    largest = np.iinfo(dtype).max
-    at_most = values >= float(largest)
-    return np.where(at_most, np.array(largest, dtype), np.where(at_most, 0.0, values).astype(dtype))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fmu_kit.units import base_unit_exponents
 from orchestration.components.building import wrap
-from orchestration.components.fmi.read_description import NUMERIC, Model, Variable
+from orchestration.components.fmi.read_description import NUMERIC, Model, Variable, items_text
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.proposal import PERIOD, STEP, STOP, experiment, key_of, listed, placed, to_fill_in
 
@@ -107,7 +107,7 @@ def _about(variable: Variable, what: str) -> tuple[str, str | None]:
     """
     described, unit = variable.description or f"{what} {variable.name}", variable.unit
     if variable.choices:
-        described += f": {', '.join(f'{item} {number}' for item, number in variable.choices.items())}"
+        described += f": {items_text(variable.choices)}"
     if unit is not None:
         try:
             base_unit_exponents(unit)

@@ -68,11 +68,18 @@ def test_types_arrays_and_held_inputs_are_those_of_fmpy(
 
 
 @needs_compiler
-def test_the_largest_integer_is_in_the_file_what_it_is_by_fmpy(main: Main, here: Path) -> None:
-    fmu = known(small(here, fmi=3, more='<Int64 name="most" valueReference="11" causality="output"/>'))
-    main("run", fmu, "--in-process", "--output", "out.csv", "--output-interval", "0.5", "--record", "most")
+def test_an_integer_of_64_bits_is_in_the_file_what_it_is_by_fmpy_or_refused(main: Main, here: Path) -> None:
+    most = '<Int64 name="most" valueReference="11" causality="output"/>'
+    flags = ("--in-process", "--output", "out.csv", "--output-interval", "0.5")
+    fmu = known(small(here, "MOST_IS=INT64_MIN", fmi=3, more=most))
+    main("run", fmu, *flags, "--record", "most")
     assert Path("out.csv").read_text() == by_fmpy(fmu, output=["most"], output_interval=0.5, stop_time=1.0)
-    assert str(2**63 - 1) in Path("out.csv").read_text()
+    for engine in ("compiled", "python"):
+        fmu = small(here / engine, "MOST_IS=INT64_MAX-(s->count<1)*1023", fmi=3, more=most)
+        refused = main("run", fmu, *flags, "--engine", engine, "--record", "most", code=1).stderr
+        named = f"Small.most = {2**63 - 1}: expected a whole number that a float holds: all are up to 2**53"
+        assert f"{named}; it runs where this is neither recorded nor connected, at t = 0.5 s" in refused
+        main("run", fmu, *flags, "--engine", engine, "--record", "count")
 
 
 def test_without_flags_the_default_experiment_runs_as_in_fmpy(built: dict[str, Path]) -> None:

@@ -42,6 +42,8 @@ class CheckedInstance(NativeInstance):
     Errors of its calls name the function without the instance.
     """
 
+    reads_exactly = False
+
     def __init__(self, model: Model, folder: Path, name: str, beat: Beat) -> None:
         self._beat = beat
         self._transfers: dict[tuple[str, tuple[str, ...]], tuple[Floats, Transfer]] = {}

@@ -23,6 +23,10 @@ typedef struct { Log2 log; void *allocate, *release, *finished, *environment; } 
 #define TRUTH 1
 #endif
 
+#ifndef MOST_IS
+#define MOST_IS INT64_MAX
+#endif
+
 typedef struct { double u[2], x[2], gain, next, reached; int on, mode, count, ended; char label[32]; } State;
 typedef struct { State s; double stop; char name[64]; Log2 log2; Log3 log3; void *environment; } Model;
 
@@ -333,7 +337,11 @@ API int fmi3GetBoolean(void *c, const unsigned vr[], size_t n, bool v[], size_t 
 }
 API int fmi3SetBoolean(void *c, const unsigned vr[], size_t n, const bool v[], size_t m) { ((Model *)c)->s.on = *v; return OK; }
 API int fmi3GetUInt8(void *c, const unsigned vr[], size_t n, uint8_t v[], size_t m) { *v = ((Model *)c)->s.count; return OK; }
-API int fmi3GetInt64(void *c, const unsigned vr[], size_t n, int64_t v[], size_t m) { *v = vr[0] == MOST ? INT64_MAX : ((Model *)c)->s.mode; return OK; }
+API int fmi3GetInt64(void *c, const unsigned vr[], size_t n, int64_t v[], size_t m) {
+    State *s = &((Model *)c)->s;
+    *v = vr[0] == MOST ? MOST_IS : s->mode;
+    return OK;
+}
 API int fmi3SetInt64(void *c, const unsigned vr[], size_t n, const int64_t v[], size_t m) { ((Model *)c)->s.mode = *v; return OK; }
 
 API int fmi3GetFMUState(void *c, void **state) {

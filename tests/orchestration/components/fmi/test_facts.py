@@ -18,7 +18,8 @@ def test_show_answers_what_fmpy_reads_and_what_a_master_needs(main: Main, tmp_pa
     shown, read = main("show", fmu).stdout.splitlines(), fmpy.read_model_description(str(fmu), validate=False)
     assert shown[0] == "Small: FMI 3.0, co-simulation; 2 inputs, 3 outputs, 2 parameters"
     assert "  canHandleVariableCommunicationStepSize  no" in shown
-    assert "u         input      continuous   Float64[2]                             0 0" in shown
+    assert "u         input      continuous   Float64[2]                                     0 0" in shown
+    assert any("Enumeration (1 = forward, 2 = backward)" in line for line in shown)
     document = json.loads(main("show", fmu, "--json").stdout)
     assert document["verdict"] == shown[0]
     assert {v["name"] for v in document["variables"]} == {v.name for v in read.modelVariables}

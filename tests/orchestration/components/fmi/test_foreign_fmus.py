@@ -85,6 +85,9 @@ def test_types_and_enumerations_by_name(tmp_path: Path) -> None:
         ran(alone(small(tmp_path), parameters={"mode": 3}))
     with pytest.raises(UsageError, match=r"^components.it.record: label is a String: only numbers can be recorded"):
         ran(alone(small(tmp_path), record=("label",)))
+    way = '<Enumeration name="way" valueReference="6" causality="output" declaredType="Mode" description="of it"/>'
+    result = ran(alone(small(tmp_path / "3", fmi=3, more=way), parameters={"mode": "backward"}, array=True))
+    assert (last(result, "it.way"), result.described["it.way"].text) == (2.0, "of it: 1 = forward, 2 = backward")
 
 
 def test_a_number_that_a_type_does_not_hold_is_refused(tmp_path: Path) -> None:
@@ -100,6 +103,12 @@ def test_a_number_that_a_type_does_not_hold_is_refused(tmp_path: Path) -> None:
             it.writer(("gain",), np.array([1e39]))()
         with pytest.raises(UsageError, match=r"^it.big = 9007199254740993: expected a whole number that a float holds"):
             it.set("big", 2**53 + 1)
+    wide = (
+        f'<Int64 name="wide" valueReference="9" causality="input" start="{2**53 + 1} 1"><Dimension start="2"/></Int64>'
+    )
+    with opening.open_here(small(tmp_path / "array", fmi=3, more=wide), "it") as it:
+        (call,) = it.calls_of(it.writer(("wide[2]",), np.ones(1)))
+        assert call.part.buffer.tolist() == [2**53 + 1, 1], "what is set with an element keeps its digits"
 
 
 @pytest.mark.parametrize("engine", ["compiled", "python"])
