@@ -419,7 +419,7 @@ def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     assert printed.splitlines()[-1] == "CascadedController,0.02,1,0,0.0,,,0.0,,,UnifiedController"
     of_diverged = pd.read_csv(tmp_path / "results/study/differences_diverged.csv")
     assert list(of_diverged)[3:] == ["difference", "low", "high"]
-    swept = quadcosim.sweep("study.toml")
+    swept = quadcosim.sweep("study.toml", engine="compiled")
     assert swept.differences("diverged")["difference"].tolist() == of_diverged["difference"].tolist()
     main("export", "study.toml", "--format", "csv", "--metric", "position_rmse", "--mean")
     means = pd.read_csv(tmp_path / "results/study/means_position_rmse.csv")
