@@ -24,7 +24,7 @@ import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from fractions import Fraction
-from math import gcd, isfinite, lcm
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from orchestration.components.building.models import FMI3, WRAPPED
 from orchestration.foundation.basics.documents import read_text, toml_of
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError, prefixed
 from orchestration.foundation.basics.records import record
+from orchestration.foundation.basics.times import common_step
 from orchestration.foundation.processes import subprocesses
 
 WHAT = "file of a controller in C"
@@ -160,9 +161,7 @@ class WrapFile:
 
     @property
     def _common(self) -> Fraction:
-        periods = [Fraction(str(task.period)) for task in self.tasks] or [Fraction(str(self.period))]
-        scale = lcm(*(period.denominator for period in periods))
-        return Fraction(gcd(*(int(period * scale) for period in periods)), scale)
+        return common_step([Fraction(str(task.period)) for task in self.tasks] or [Fraction(str(self.period))])
 
     def variables(self) -> Iterator[tuple[str, str, WrappedVariable]]:
         """Each variable with its table and its name: inputs, outputs, parameters."""

@@ -348,14 +348,12 @@ class Adapted2(AdaptedInstance, Fmi2Instance):
     """One of FMI 2.0."""
 
     only_calls = True
-    step_name = "step"
 
 
 class Adapted3(AdaptedInstance, Fmi3Instance):
     """One of FMI 3.0."""
 
     only_calls = True
-    step_name = "step"
 
 
 class Partition(Adapted3):
@@ -365,7 +363,6 @@ class Partition(Adapted3):
     """
 
     only_calls = True
-    step_name = "step"
 
     def __init__(
         self, path: Path, instance_name: str, access: Access = USUAL, owner: "Partition | None" = None

@@ -39,11 +39,6 @@ def logged(message: bytes) -> bytes:
     return message.replace(b"%%", b"%")
 
 
-def without_banner(text: str) -> str:
-    """The slave's own text of an error, without the line that pythonfmu prepends."""
-    return text.partition("\n")[2] if text.startswith(_BANNER) else text
-
-
 def uri_is_read(folder: Path) -> bool:
     """Whether pythonfmu finds an FMU that is unpacked in `folder`; it crashes if it does not.
 
@@ -139,7 +134,8 @@ def failure_text(messages: Sequence[Message], otherwise: str) -> tuple[str, str]
     """The first line of the first message of a failure, and the rest of it; `otherwise` if there is none."""
     bad = [message for message in messages if message[0] > WARNING]
     text = bad[0][2].decode("utf-8", "replace") if bad else otherwise
-    summary, _, details = without_banner(text).partition("\n")
+    own = text.partition("\n")[2] if text.startswith(_BANNER) else text  # without the line that pythonfmu prepends
+    summary, _, details = own.partition("\n")
     return summary, details
 
 

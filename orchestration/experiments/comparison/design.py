@@ -168,6 +168,12 @@ class Comparison:
     @cached_property
     def study(self) -> Study:
         """The study of all runs, cell by cell. Each initial condition has its own seed, the same in every cell."""
+        on_vehicles: dict[Key, Values] = {
+            (v.name, one.name): self.parameters_for(v, one) for v in self.vehicles for one in self.controllers
+        }
+        tuned: dict[Key, Values] = {
+            (one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()
+        }
         return Study(
             name=self.name,
             base=self.base,
@@ -181,9 +187,9 @@ class Comparison:
                 Axis(name=START, targets=(), values=tuple(range(len(self.initial_conditions)))),
             ),
             together=(
-                LinkedSettings(axes=(VEHICLE, CONTROLLER), sets=self._vehicle_settings()),
+                LinkedSettings(axes=(VEHICLE, CONTROLLER), sets=on_vehicles),
                 LinkedSettings(axes=(CONTROLLER,), sets={(one.name,): one.sets for one in self.controllers}),
-                LinkedSettings(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=self._tuned_settings()),
+                LinkedSettings(axes=(CONTROLLER, VEHICLE, self.axis.name), sets=tuned),
                 LinkedSettings(
                     axes=(CONDITION,),
                     sets={(one.name,): one.sets for one in self.conditions},
@@ -206,12 +212,6 @@ class Comparison:
     def parameters_for(self, entry: VehicleEntry, controller: Controller) -> dict[str, Value]:
         """The parameters of the plant of a vehicle and of a controller on it, by target."""
         return {} if entry.vehicle is None else dict(entry.vehicle.parameters_for(self.fmu_of(controller)))
-
-    def _vehicle_settings(self) -> dict[Key, Values]:
-        return {(v.name, one.name): self.parameters_for(v, one) for v in self.vehicles for one in self.controllers}
-
-    def _tuned_settings(self) -> dict[Key, Values]:
-        return {(one.name, *key): changes for one in self.controllers for key, changes in one.tuned.items()}
 
     def values_of(self, condition: str, value: Value) -> dict[str, Value]:
         """The values by axis at a condition and a value of the first axis."""

@@ -123,7 +123,8 @@ def shares_along(rows: Sequence[Row], axis: ColumnAxis, *, by_chance: bool) -> S
         groups: dict[Any, list[Row]] = {value: [] for value in _ordered(distinct)}
         for row, value in zip(rows, values):
             groups[value].append(row)
-        shown = {value: _displayed(value, axis.quantity) for value in groups}
+        has_unit = axis.quantity.factor != 1.0
+        shown = {value: float(axis.quantity.of(value)) if has_unit else value for value in groups}
         shares = [share_of(_text(shown[v]), _number(shown[v]), of, by_chance=by_chance) for v, of in groups.items()]
     else:
         shares = [*_by_part(rows, axis.quantity.of(values), axis, by_chance=by_chance)]
@@ -152,11 +153,6 @@ def _ordered(values: list[Any]) -> list[Any]:
 
 def _text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _displayed(value: Any, quantity: Quantity) -> Any:
-    """A value in its display unit; a text as it is."""
-    return value if quantity.factor == 1.0 else float(quantity.of(value))
 
 
 def _number(value: Any) -> float | None:

@@ -182,7 +182,8 @@ class RunColumns:
         factors: dict[str, float | None] = {}
         for path in own:
             kind: type = int if path == _SEED and not axis.multiplies else float
-            if not self._is_open(path) or any(type(value) is not kind for value in axis.values or (kind(),)):
+            is_open = path == _SEED or parameter_name(path) in self.starts
+            if not is_open or any(type(value) is not kind for value in axis.values or (kind(),)):
                 return None
             try:
                 factors[path] = study.product(1.0, path, {}, self.files.start_values) if axis.multiplies else None
@@ -191,9 +192,6 @@ class RunColumns:
         if any(path == _SEED for path in own) and not all(0 <= int(seed) < 2**63 for seed in axis.values or ()):
             return None
         return factors
-
-    def _is_open(self, path: str) -> bool:
-        return path == _SEED or parameter_name(path) in self.starts
 
 
 def _json(value: Value) -> str:

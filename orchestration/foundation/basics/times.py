@@ -3,7 +3,7 @@
 import functools
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, overload
@@ -61,6 +61,13 @@ def is_at_least(seconds: float, nanoseconds: float) -> bool:
     if abs(about - nanoseconds) > 1e-9 * nanoseconds:
         return about > nanoseconds
     return exact_nanoseconds(seconds) >= Fraction(repr(float(nanoseconds)))
+
+
+def common_step(times: Iterable[Fraction]) -> Fraction:
+    """The longest step of which all times are multiples."""
+    given = [*times]
+    scale = math.lcm(*(time.denominator for time in given))
+    return Fraction(math.gcd(*(int(time * scale) for time in given)), scale)
 
 
 class Grid:

@@ -1,11 +1,13 @@
 """Thrust and torques as applied, with marks for events and for active limits of the plant, and their power spectrum."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.mlab import psd
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.quadrotor.scenarios.measures import saturated
@@ -185,18 +187,9 @@ def welch(values: Floats, step: float) -> tuple[Floats, Floats]:
     [unit²/Hz], shape (m, signals).
     """
     length = min(len(values), max(MIN_SEGMENT, len(values) // SEGMENTS))
-    starts = range(0, len(values) - length + 1, max(1, length // 2))
-    window = np.hanning(length + 1)[:-1, None]
-    power = np.zeros((length // 2 + 1, values.shape[1]))
-    for start in starts:
-        part = values[start : start + length]
-        power += np.abs(np.fft.rfft(window * (part - part.mean(axis=0)), axis=0)) ** 2
-    density: Floats = 2.0 * step / float((window**2).sum()) * power / len(starts)
-    density[0] /= 2.0
-    if length % 2 == 0:
-        density[-1] /= 2.0
-    frequencies: Floats = np.arange(length // 2 + 1) / (length * step)
-    return frequencies, density
+    how: Any = {"NFFT": length, "noverlap": length - length // 2, "window": np.hanning(length + 1)[:-1]}
+    found = [psd(signal, Fs=1.0 / step, detrend="mean", **how) for signal in values.T]
+    return np.asarray(found[0][1]), np.column_stack([np.asarray(density) for density, _ in found])
 
 
 def _command(run: DrawnRun) -> tuple[float, Floats] | None:

@@ -243,7 +243,8 @@ def _of_file_or_signal(system: System, name: str, streams: Streams) -> sources.S
 
     if source.is_motion:
         assert source.file is not None
-        return sources.Moving(sources.spline_values(read_waypoints(source.file, source.parameters)), quantities)
+        curve = read_waypoints(source.file, source.parameters)
+        return sources.Moving(lambda t: curve.at(t).reshape(len(t), -1), quantities)
     table = table_of(source, system.stop_time)
     return sources.HeldValues(*table) if source.interpolation == "previous" else sources.TableValues(*table)
 
@@ -254,12 +255,8 @@ def table_of(source: Source, stop_time: float) -> tuple[Floats, Floats]:
 
     assert source.file is not None
     begin, held = source.start_time or 0.0, source.outside == "held"
-    return read_table(source.file, table_columns(source), stop_time, begin=begin, held=held)
-
-
-def table_columns(source: Source) -> Sequence[str]:
-    """The columns of the file of a source, in the order of the inputs."""
-    return [variable_of(end) for end in source.to] if source.columns is None else source.columns
+    columns = source.columns or [variable_of(end) for end in source.to]
+    return read_table(source.file, columns, stop_time, begin=begin, held=held)
 
 
 def fixed_steps(system: System, models: Mapping[str, Model]) -> dict[str, FixedStep]:

@@ -16,7 +16,6 @@ from orchestration.systems.signals.dryden import DRAWS, Dryden
 
 if TYPE_CHECKING:
     from orchestration.systems.signals.motions import Motion
-    from orchestration.systems.signals.spline import Spline
 
 
 class SourceValues(Protocol):
@@ -160,11 +159,6 @@ def motion_values(motion: "Motion") -> Callable[[Floats], Floats]:
         return np.column_stack([coordinate for order in orders for coordinate in order])
 
     return over
-
-
-def spline_values(curve: "Spline") -> Callable[[Floats], Floats]:
-    """The curve through waypoints, at times (n,) [s] as an array (n, 15)."""
-    return lambda t: curve.at(t).reshape(len(t), -1)
 
 
 def gusts(air: Dryden, stop_time: float, stream: np.random.Generator) -> TableValues:

@@ -1,6 +1,5 @@
 """One FMU alone as a system, as `fmpy simulate` runs it: its default experiment, and inputs from a file."""
 
-import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -15,6 +14,7 @@ from orchestration.components.fmi.access import SCHEDULED, Access, Interface, So
 from orchestration.components.fmi.instance import convert_value
 from orchestration.components.fmi.read_description import Model, called, declared_of, read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
+from orchestration.foundation.basics.times import common_step
 from orchestration.simulation.engines.resolved import table_of
 from orchestration.systems.signals.table_file import TIME, header_of, read_rows, words_of
 from orchestration.systems.system.component import Component, Parameter, Sampling
@@ -118,7 +118,7 @@ def late_jump(system: System) -> str | None:
     if not late:
         return None
     first, name = min(late)
-    shorter = functools.reduce(_common, (time for time, _ in late), step)
+    shorter = common_step([step, *(time for time, _ in late)])
     advice = f"; --output-interval {float(shorter):.10g} has every jump at its time" if shorter >= SHORTEST else ""
     return (
         f"input {name} jumps at {float(begin + first)} s, between steps of {float(step):.10g} s, which the FMU takes "
@@ -134,12 +134,6 @@ def _jumps(sources: Mapping[str, Source], end: float) -> Iterator[tuple[float, s
         for column, to in zip(values.T, source.to):
             jumps = times[1:][(np.diff(column) != 0.0) & may_jump].tolist()
             yield from ((time, variable_of(to)) for time in jumps if 0.0 < time < end)
-
-
-def _common(one: Fraction, other: Fraction) -> Fraction:
-    """The longest step of which both times are multiples."""
-    denominator = math.lcm(one.denominator, other.denominator)
-    return Fraction(math.gcd(int(one * denominator), int(other * denominator)), denominator)
 
 
 def _clock(model: Model, name: str, record: Sequence[str], interval: float | None) -> Sampling | None:

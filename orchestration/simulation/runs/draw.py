@@ -144,12 +144,8 @@ def _settings(result: Result) -> dict[str, Any]:
 
 def _is_setting_that_differs(path: str, runs: Sequence[Mapping[str, Any]]) -> bool:
     values = [run.get(path, _ABSENT) for run in runs]
-    return any(value != values[0] for value in values) and not _is_derived_by_master(path)
-
-
-def _is_derived_by_master(path: str) -> bool:
-    """Whether the master derives it from other settings."""
-    return path.endswith((".sample_period", ".sample_offset"))
+    is_derived = path.endswith((".sample_period", ".sample_offset"))  # by the master, of other settings
+    return any(value != values[0] for value in values) and not is_derived
 
 
 def _setting_text(path: str, named: Quantity, value: Any) -> str:

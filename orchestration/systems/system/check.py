@@ -216,7 +216,7 @@ def connect_references(system: System, models: Mapping[str, Model]) -> System:
     sources, components = dict(system.sources), dict(system.components)
     for name, source, follower in _reference_sources(system):
         model = models[follower]
-        if source.is_built_in and has_built_in_trajectory(model):
+        if source.is_built_in and not TRAJECTORY.keys().isdisjoint(model.variables):
             continue
         inputs = {*model.names("input")}
         to = tuple(f"{follower}.{name}.{each}" for each in MOTION if f"{name}.{each}" in inputs)
@@ -243,11 +243,6 @@ def describe_references(system: System, models: Mapping[str, Model]) -> str:
         for name, source, follower in _reference_sources(system)
     )
     return "; ".join(words)
-
-
-def has_built_in_trajectory(model: Model) -> bool:
-    """Whether an FMU has a built-in trajectory."""
-    return not TRAJECTORY.keys().isdisjoint(model.variables)
 
 
 def _reference_sources(system: System) -> Iterator[tuple[str, Source, str]]:

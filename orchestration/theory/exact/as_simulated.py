@@ -154,7 +154,7 @@ class SimulatedEffects(LoopEffects):
             starts = np.array([self.signal_row(name) for name in mean.signals])
             ends = np.array(
                 [
-                    start if name in self.fed_by and self._is_wired(name) else start @ after
+                    start if name in self.fed_by and self.fed_by[name][0].name in self.wires else start @ after
                     for name, start in zip(mean.signals, starts)
                 ]
             )
@@ -165,9 +165,6 @@ class SimulatedEffects(LoopEffects):
                 points = ((starts, 0.5), (ends, 0.5))  # type: ignore[assignment]
             found[k] = sum(h * weight * self.quadratic_form(mean, rows) for rows, weight in points)
         return found
-
-    def _is_wired(self, end: str) -> bool:
-        return self.fed_by[end][0].name in self.wires
 
 
 def _with_held_inputs(part: Continuous) -> tuple[Floats, Floats, Floats]:

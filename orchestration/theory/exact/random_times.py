@@ -17,11 +17,6 @@ Kinks = Callable[[int, int], Sequence[int]]
 """The times strictly between two times at which costs may have a kink over the time of an event"""
 
 
-def no_kinks(low: int, high: int) -> Sequence[int]:
-    """None."""
-    return ()
-
-
 @dataclass(frozen=True)
 class RandomTime:
     """A random amount of time, in whole units of the caller's choice."""
@@ -65,7 +60,7 @@ class RandomTime:
         if self.added is None:
             return self._own_draws(base, kinks, order)
         found: dict[int, float] = {}
-        for value, p in self._own_draws(base, no_kinks, order):
+        for value, p in self._own_draws(base, lambda low, high: (), order):
             for further, q in self.added.draws(base + value, kinks, order):
                 found[value + further] = found.get(value + further, 0.0) + p * q
         return sorted(found.items())
