@@ -112,15 +112,17 @@ class Grid:
         """The instants with indices from `first` to before `end`, as an array."""
         import numpy as np  # not needed to read a system
 
-        if abs(self._offset + end * self._period) + 1 >= 2**62:
+        offset, offset_rest, period, rest, parts = self.in_parts() or (0, 0, 0, 0, 2**62)
+        if max(abs(offset), period, parts) * (end + 2) >= 2**62:
             return np.array([self[k] for k in range(first, end)], dtype=np.int64)
-        numerators = self._offset + np.arange(first, end, dtype=np.int64) * self._period
-        if self._denominator == 1:
-            return numerators
-        quotients, rests = np.divmod(numerators, self._denominator)
+        indices = np.arange(first, end, dtype=np.int64)
+        instants = offset + indices * period
+        if parts == 1:
+            return instants
+        more, rests = np.divmod(offset_rest + indices * rest, parts)
+        instants += more
         twice = 2 * rests
-        up = (twice > self._denominator) | ((twice == self._denominator) & (quotients % 2 == 1))
-        return np.asarray(quotients + up)
+        return np.asarray(instants + ((twice > parts) | ((twice == parts) & (instants % 2 == 1))))
 
 
 @functools.lru_cache(64)  # most are common to the runs of a study

@@ -54,14 +54,19 @@ def many(timing: dict[str, Any], count: int, seed: int = 1) -> list[Sample]:
     st.integers(0, 10**15),
 )
 def test_instants_do_not_drift_however_far_they_are(offset: Fraction, period: Fraction, k: int) -> None:
-    assert Grid(offset, period)[k] == round(offset + k * period)
+    grid = Grid(offset, period)
+    assert grid[k] == round(offset + k * period)
+    first = k % 10**5
+    assert grid.between(first, first + 3).tolist() == [grid[first + i] for i in range(3)]
 
 
 @given(st.integers(0, 10**9), st.integers(1, 10**9), st.integers(0, 10**9))
 def test_an_instant_between_two_nanoseconds_is_at_the_even_one(offset: int, period: int, k: int) -> None:
     doubled = offset + k * period
     lower = doubled // 2
-    assert Grid(Fraction(offset, 2), Fraction(period, 2))[k] == lower + (doubled % 2 and lower % 2)
+    grid = Grid(Fraction(offset, 2), Fraction(period, 2))
+    assert grid[k] == lower + (doubled % 2 and lower % 2)
+    assert grid.between(k, k + 1).tolist() == [grid[k]]
 
 
 # -- jitter -----------------------------------------------------------------------
