@@ -81,20 +81,30 @@ def packages_of(target: Target) -> tuple[str, ...]:
 
 
 def _source_hash(packing: Packing, target: Target) -> str:
-    """The hash of a slave of this project, computed once while the files of its packages are the same.
+    """The hash of a slave, computed once while the files of its packages, or all beside it, are the same.
 
-    It is kept in the user's cache: parsing what all modules import takes 60 ms, which each command would spend.
+    That of this project's is kept in the user's cache: parsing what all modules import takes 60 ms, which each command
+    would spend. What lies among packages, or has a page by hand, may depend on any file: it is computed each time.
     """
-    folders = [str(module_path(package).parent) for package in packages_of(target)]
-    return _cached_source_hash(
-        packing, target, shutil.which("cc"), tuple(file for folder in folders for file in _files(folder))
-    )
+    packages = packages_of(target) if target.root is None else SHARED_PACKAGES
+    folders = [str(module_path(package).parent) for package in packages]
+    files = [file for folder in folders for file in _files(folder)]
+    if target.root is not None:
+        with os.scandir(target.root) as entries:
+            beside = [entry for entry in entries if entry.name != "__pycache__"]
+        is_alone = target.fragment.parent == target.root and not target.fragment.is_file()
+        if not is_alone or any(Path(entry.path, "__init__.py").is_file() for entry in beside):
+            return packing.source_hash(target)
+        files += [_state(entry) for entry in beside if entry.name.endswith((".py", ".png"))]
+    return _cached_source_hash(packing, target, shutil.which("cc"), tuple(files))
 
 
-@functools.lru_cache(maxsize=16)
+@functools.lru_cache(maxsize=64)
 def _cached_source_hash(
     packing: Packing, target: Target, compiler: str | None, files: tuple[tuple[str, int, int, int], ...]
 ) -> str:
+    if target.root is not None:
+        return packing.source_hash(target)
     import platformdirs
 
     state = repr((packing.folder, target, compiler, files, sys.version))
@@ -113,10 +123,14 @@ def _files(folder: str) -> Iterator[tuple[str, int, int, int]]:
     with os.scandir(folder) as entries:
         for entry in entries:
             if not entry.is_dir():
-                about = entry.stat()
-                yield entry.path, about.st_mtime_ns, about.st_ctime_ns, about.st_size
+                yield _state(entry)
             elif entry.name != "__pycache__":
                 yield from _files(entry.path)
+
+
+def _state(entry: "os.DirEntry[str]") -> tuple[str, int, int, int]:
+    about = entry.stat()
+    return entry.path, about.st_mtime_ns, about.st_ctime_ns, about.st_size
 
 
 def build(
@@ -288,7 +302,11 @@ def _run_packer(
 def is_out_of_date(path: Path, target: Target, packing: Packing) -> bool:
     """Whether an FMU is missing, or was built from other sources than those of its slave."""
     carried = read_source_hash(path)
-    return not path.exists() if carried is None else carried != translating_errors(packing.source_hash, target)
+    return (
+        not path.exists()
+        if carried is None
+        else carried != translating_errors(functools.partial(_source_hash, packing), target)
+    )
 
 
 Argument = TypeVar("Argument")

@@ -277,6 +277,38 @@ def test_a_variant_is_built_again_with_its_values_when_its_sources_change(packin
     assert (read_model(path).variables["share"].is_constant, read_model(path).variables["share"].start) == (True, "0.5")
 
 
+def test_sources_in_a_folder_are_read_again_when_they_or_what_lies_beside_them_change(tmp_path: Path) -> None:
+    read: list[Target] = []
+
+    def source_hash(target: Target) -> str:
+        read.append(target)
+        return str(len(read))
+
+    packing = replace(builder.IN_PYTHON, source_hash=source_hash)
+    (tmp_path / "slave.py").touch()
+
+    def times() -> int:
+        for _ in range(2):
+            builder._source_hash(packing, Target("slave", "OwnPlant", tmp_path))
+        return len(read)
+
+    assert times() == 1
+    (tmp_path / "slave.py").write_text("x = 1\n")
+    assert times() == 2
+    (tmp_path / "more.py").touch()
+    assert times() == 3
+    (tmp_path / "OwnPlant.png").touch()
+    assert times() == 4
+    (tmp_path / "OwnPlant.fmu").touch()
+    assert times() == 4
+    (tmp_path / "OwnPlant.html").touch()
+    assert times() == 6, "its page may include any file"
+    (tmp_path / "OwnPlant.html").unlink()
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "__init__.py").touch()
+    assert times() == 8, "a package may have any"
+
+
 def test_the_hash_of_sources_is_kept_for_other_processes_while_no_file_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
