@@ -1,6 +1,8 @@
 """Memory of rows and events that are not handed over, shared with C; in files of a folder it survives its process."""
 
 import ctypes
+import mmap
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,15 +23,17 @@ LOOP, ROWS, EVENTS = "loop", "rows", "events"
 Bytes = npt.NDArray[np.uint8]
 Allocator = Callable[[str, int], Bytes]
 """Allocates memory of a size [byte] by name; a later allocation with the same name replaces the earlier one"""
+_PRIVATE: dict[str, int] = {} if os.name == "nt" else {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS}
 
 
 def process_memory(name: str, size: int) -> Bytes:
     """Allocate memory that ends with the process.
 
-    It is not NumPy's, which asks for huge pages: on virtual machines the first touch of these takes three to four times
-    as long, which was most of the time of a step that is recorded.
+    A page of it is touched when it is first written to: a short run needs few. It is not NumPy's, which asks for huge
+    pages: on virtual machines the first touch of these takes three to four times as long, which was most of the time of
+    a step that is recorded.
     """
-    return np.frombuffer(bytearray(max(size, 1)), dtype=np.uint8, count=size)
+    return np.frombuffer(mmap.mmap(-1, max(size, 1), **_PRIVATE), dtype=np.uint8, count=size)
 
 
 @dataclass(frozen=True)
