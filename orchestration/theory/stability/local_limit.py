@@ -58,6 +58,8 @@ class Commensurate:
 
     scan: list[float]
     """the scan's own that are, and multiples of the other periods, at which it may be unstable between stable ones"""
+    longest_first: list[float]
+    """the same, the longest hyperperiod first: what is measured over a long one serves over shorter ones"""
     fine: list[float]
     """candidates between them"""
 
@@ -203,8 +205,11 @@ def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | 
 
     added = sorted({value for period in others for value in multiples(period)})
     few = added[:: math.ceil(len(added) / MOST_MULTIPLES)] if added else added
-    scan = [value for value in sorted({*values, *few}) if hyperperiod_of(at(value)) is not None]
-    return Commensurate(scan=scan, fine=multiples(hyperperiod(others) / LONGEST_HYPERPERIOD))
+    repeats = {value: hyperperiod_of(at(value)) for value in sorted({*values, *few})}
+    known = {value: period for value, period in repeats.items() if period is not None}
+    longest_first = sorted(known, key=known.__getitem__, reverse=True)
+    fine = multiples(hyperperiod(others) / LONGEST_HYPERPERIOD)
+    return Commensurate(scan=[*known], longest_first=longest_first, fine=fine)
 
 
 def _naming_values(growth: Growth, span: Range) -> Growth:
@@ -228,17 +233,22 @@ def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimi
     """The first value at which small deviations grow, up and down from the system's own, and all that were found."""
     if not rates.scan:
         return LinearLimit(reason="no local limit: several rates, which repeat together at no value of the scan")
-    tried, growth = dict[float, float](), _naming_values(growth, span)
+    tried = dict[float, float]()
 
-    def grows(value: float) -> bool:
+    def kept(value: float) -> float:
         if value not in tried:
             tried[value] = growth(value)
-        return tried[value] > 0.0
+        return tried[value]
+
+    for value in rates.longest_first:
+        with suppress(UsageError):  # a loop that is unstable need not come to rest
+            kept(value)
+    named = _naming_values(kept, span)
+
+    def grows(value: float) -> bool:
+        return named(value) > 0.0
 
     ends = ends_of_good(grows, rates.scan, span.own, span.last)
-    for value in rates.scan:  # beyond, where a loop that is unstable need not come to rest
-        with suppress(UsageError):
-            grows(value)
     lower, upper = (None if end is None or end.good is None else _narrowed(grows, end, rates) for end in ends)
     runs = [
         [value for value, _ in run]

@@ -1,6 +1,7 @@
 """Local limits by twin runs, which a second pulse has to confirm."""
 
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import local_limit
-from orchestration.theory.stability.operating_point import NotAnEquilibriumError
+from orchestration.theory.stability.operating_point import NotAnEquilibriumError, hyperperiod_of
 from orchestration.theory.stability.perturbed_runs import Growth
 
 SPAN = Range(first=0.05, step=0.05, last=1.0, tolerance=5e-3)
@@ -120,7 +121,15 @@ def test_a_period_among_several_rates_has_no_limit_beyond_a_value_that_is_unstab
     assert (found.limit - found.accuracy, found.limit + found.accuracy) == pytest.approx((0.19, 0.1904))
     named = "local: small deviations grow at 190.4 ms to 190.8 ms, 191.6 ms to 192 ms, 904 ms to 1 s, of "
     assert found.reason.startswith(named)
+    repeating = list[Fraction]()
+
+    def decays(system: System, *_: Any, **__: Any) -> float:
+        repeating.append(hyperperiod_of(system) or Fraction(0))
+        return -1.0
+
+    monkeypatch.setattr(local_limit, "growth_of_loop", decays)
     none = local_limit.about_rest(two, replace(SPAN, last=0.15))
+    assert repeating == sorted(repeating, reverse=True), "a tangent over a long period serves shorter ones, too"
     assert none.limit is None
     assert none.reason.startswith("local: small deviations grow at none, of 15 values from 50 ms to 150 ms")
     monkeypatch.setattr(local_limit, "hyperperiod_of", lambda system: None)
