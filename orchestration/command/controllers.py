@@ -8,6 +8,7 @@ import typer
 
 from orchestration.command import printed_tables, verdicts
 from orchestration.command.figure_flags import FigureFlags
+from orchestration.command.flags import AsSimulated
 from orchestration.command.options import option
 from orchestration.command.printed_tables import TABLE
 from orchestration.command.registry import CommandResult, build_option, option_group, result_of_files
@@ -116,6 +117,7 @@ def tune(
     workers: Workers = 1,
     dask: Dask = None,
     engine: StudyEngineFlag = "auto",
+    as_simulated: AsSimulated = False,
 ) -> CommandResult:
     """Tune a controller on some initial conditions and evaluate it on others; it resumes where it was stopped."""
     from orchestration.experiments.tuning.tune import tune as search_all
@@ -123,8 +125,10 @@ def tune(
     from orchestration.simulation.workers.choice import engine_choice
 
     command = f"quadcosim tune {tuning} --out {out}" + (f" --engine {engine}" if engine != "auto" else "")
+    command += " --as-simulated" if as_simulated else ""
     tuned = search_all(
-        load_tuning(tuning), out=out, workers=workers, dask=dask, engine=engine_choice(engine), command=command
-    )
+        load_tuning(tuning), out=out, workers=workers, dask=dask, engine=engine_choice(engine),
+        as_simulated=as_simulated, command=command,
+    )  # fmt: skip
     written = result_of_files(tuned.written)
     return dataclasses.replace(written, verdict=tuned.verdict)

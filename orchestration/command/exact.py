@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
+from orchestration.command.flags import AsSimulated, FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import in_columns, warn
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 def expect(
     scenario: ScenarioFile = None,
     timing: Timing = None,
-    as_simulated: Annotated[
-        bool, option("--as-simulated", "The average of what runs print: noise held, means over their rows.")
-    ] = False,
+    as_simulated: AsSimulated = False,
     horizon: Annotated[
         float | None, option("--horizon", "Means from the initial conditions to this time.", "SECONDS")
     ] = None,

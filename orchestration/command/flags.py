@@ -219,6 +219,10 @@ EngineFlag = Annotated[
     option("--engine", "Simulation loop, with the same results; default: compiled where possible.", "python|compiled"),
 ]
 
+AsSimulated = Annotated[
+    bool, option("--as-simulated", "The average of what runs print: noise held, means over their rows.")
+]
+
 ScenarioFile = Annotated[
     Path | None, typer.Argument(help="System or scenario file, or SSP; without one, the paper's flight.")
 ]

@@ -24,6 +24,9 @@ UNSTABLE = 1e100
 class ExactTuning(TuningProblem):
     """A tuning for the exact expectation of its cost; raises `UsageError` for invalid values."""
 
+    as_simulated: bool = False
+    """Whether it is the expectation of what runs print, as of `expect`."""
+
     @cached_property
     def origin(self) -> System:
         """The system that the base describes, at its operating point."""
@@ -32,7 +35,7 @@ class ExactTuning(TuningProblem):
 
     def describe_cost(self) -> list[str]:
         """The definition of the cost, for the file of tuned parameters."""
-        return [f"the exact expectation of ({self.cost})."]
+        return [f"the exact expectation{', as simulated,' if self.as_simulated else ''} of ({self.cost})."]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +67,7 @@ def search_exactly(
 ) -> ExactTuningResult:
     """The result of one search; `keeping` wraps the costs of candidates to keep them."""
     files = tuning.files()
-    loops = Loops(files.models)
+    loops = Loops(files.models, simulated=tuning.as_simulated)
 
     def expected(points: Sequence[Sequence[float]]) -> list[Expected | str]:
         systems = [tuning.system(period, tuning.values(shares)) for shares in points]

@@ -93,6 +93,7 @@ def tune(
     workers: int = 1,
     dask: str | None = None,
     engine: EngineChoice = "auto",
+    as_simulated: bool = False,
     command: str = "quadcosim.tune",
     progress: ShareProgress = "bar",
     announce: Callable[[str], None] | None = inform,
@@ -102,7 +103,7 @@ def tune(
     `tuning` may be the path of its file, or the content of the file as a dictionary, as `load_tuning` takes them.
     A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes or those of a
     `dask` scheduler, and an engine, as in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if
-    available.
+    available, and its expectations are `as_simulated` if so requested, as those of `expect`.
 
     Writes a file of parameters into `out` for each period; it names `command` as its origin. Costs and results are
     kept in `folder`, default `results/NAME`: called again after an interruption, it loses the generation of points that
@@ -116,10 +117,13 @@ def tune(
     announce(tuning.effort)
     done: Sequence[SearchResult]
     if isinstance(tuning, Tuning):
+        if as_simulated:
+            raise UsageError('--as-simulated: expected cost.by = "expect"; the cost of this tuning is that of runs')
         done = _search_by_runs(tuning, folder, workers, dask, engine, progress, announce)
     elif workers != 1 or engine != "auto" or dask is not None:
         raise UsageError("--workers, --dask and --engine: expected none; a tuning by expect makes no runs")
     else:
+        tuning = dataclasses.replace(tuning, as_simulated=as_simulated or tuning.as_simulated)
         exact = dataclasses.replace(tuning, base=single_run_execution(tuning.base, "auto")[0])
         with share_reporter(progress, "searching") as report:
             find = functools.partial(search_exactly, exact)

@@ -98,6 +98,17 @@ def test_a_candidate_without_a_rest_is_passed_over_and_named(tmp_path: Path, mon
     assert re.fullmatch(r"\d+ of 18 candidates had no expectation, the first, K = .*: the operating .* rest", told[-1])
 
 
+def test_a_cost_is_that_of_what_runs_print_if_so_requested(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def known(system: System, loops: Loops) -> Expected:
+        return replace(EXPECTED, objectives={COST: 1.0 if loops.simulated else 2.0})
+
+    monkeypatch.setattr(exact, "expected_of", known)
+    found = tune(tuning(evaluations=3), out=tmp_path, folder=tmp_path, as_simulated=True, progress=None, announce=None)
+    assert found.searches[0].cost == 1.0
+    assert "evaluations of the exact expectation, as simulated, of (J)." in found.written[0].read_text()
+    assert tuned(tuning(evaluations=3), tmp_path).searches[0].cost == 2.0
+
+
 @pytest.mark.parametrize(
     ("before", "after", "named"),
     [
