@@ -25,8 +25,8 @@ def limit(
             "period|delay|jitter|loss|PATH",
         ),
     ] = None,
-    first: Annotated[float | None, option("--from", "Start of the scan.", "A")] = None,
-    last: Annotated[float | None, option("--to", "End of the scan.", "B")] = None,
+    first: Annotated[float | None, option("--from", "Lowest value.", "A")] = None,
+    last: Annotated[float | None, option("--to", "Highest value.", "B")] = None,
     tolerance: Annotated[
         float | None,
         option(
@@ -38,7 +38,7 @@ def limit(
         float | None,
         option(
             "--scan",
-            "Step of the scan upward; default of a PATH: a twentieth of the range (of a period: half of it).",
+            "Step of the scan; default of a PATH: a twentieth of the range (of a period: half of it).",
             "STEP",
         ),
     ] = None,

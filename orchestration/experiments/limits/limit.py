@@ -1,11 +1,12 @@
 """The largest good value of a quantity, measured by runs, and its local limit by linear theory."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
+from orchestration.components.fmi.read_description import Model
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
 from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import DIGITS, Bracket, Range, bisected, ends_of_good, first_failure
@@ -15,7 +16,7 @@ from orchestration.foundation.basics.terminal import ShareProgress, inform_in_pa
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus, other_periods_in_words
-from orchestration.simulation.requests.ranges import Varied, default_quantity, search_range
+from orchestration.simulation.requests.ranges import Varied, default_quantity, own_value, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import bound_of
 from orchestration.simulation.runs.scheduling import schedule
@@ -56,7 +57,8 @@ def limit(
     """Find the largest value of a quantity of a system or a scenario at which it is still good.
 
     `of` is a path, or for the quadrotor `period`, `delay`, `jitter` or `loss`; default: the period of the only sampled
-    component. The search runs from `first` to `last` in steps of `scan`; `continuous` adds a run near continuous time
+    component. The search lies between `first` and `last`: from the own value of the request up and down, or else from
+    `first` up, in steps of `scan`. `continuous` adds a run near continuous time
     (quadrotor only). The seeds of a random quantity are run by `workers` processes. The engine `auto` uses native twins
     of the FMUs if available. `progress` is called with the share done of a search in which nothing fails before the end
     of the scan, `announce` with the choice of the engine and a line for each evaluated value, by default beside the
@@ -110,6 +112,7 @@ def limit(
     scheduled = sorted(trials.tried) if varied.system.computers or varied.system.networks else []
     missed_from = _missed_from(varied, span, scheduled)
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
+    note += _own_value_in_words(varied, span, models) if bracket is not None and bracket.good is None else []
     note += _starved(varied, span, scheduled) if local.limit is None else []
     note += other_periods_in_words(varied.at(span.last), models)
     metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
@@ -136,6 +139,17 @@ def _missed_from(varied: Varied, span: Range, values: Sequence[float]) -> float 
     """The lowest value, of some rising ones and to the tolerance, at which the schedule misses deadlines."""
     bracket = first_failure(lambda value: bool(schedule(varied.at(value)).missed), values, span.tolerance)
     return None if bracket is None else bracket.bad
+
+
+def _own_value_in_words(varied: Varied, span: Range, models: Mapping[str, Model]) -> list[str]:
+    """The note on the own value of a system, where the lowest value of the scan is not good."""
+    own = own_value(varied, models)
+    if own is None or own == span.values()[0]:
+        return []
+    if span.own is not None:
+        return [f"the file's own value, {span.text(own)}, is not good either"]
+    between = f"--from {min(own, span.first):g} --to {max(own, span.last):g}"
+    return [f"with {between} the search would go up and down from the file's own value, {span.text(own)}"]
 
 
 def _starved(varied: Varied, span: Range, values: Sequence[float]) -> list[str]:
@@ -256,8 +270,8 @@ def _note(
             f"that nine seeds in ten are good is refuted at {span.text(refuted)}: {describe(trials.tried[refuted])}"
         )
     parts.append(f"what is narrower than the scan, {span.text(span.step)}, is not seen")
-    if max(trials.tried) < span.values()[-1]:
-        least, most = min(trials.tried), max(trials.tried)
+    least, most = min(trials.tried), max(trials.tried)
+    if least > span.values()[0] or most < span.values()[-1]:
         where = f"from {span.text(least)} to {span.text(most)}" if least < most else f"only {span.text(least)}"
         parts.append(f"scanned {where}, as a search ends soon after what fails: beyond that nothing is known")
     if found.lower is not None:

@@ -60,7 +60,7 @@ class Limit:
     first did."""
     large_signal_lower_limit: float | None = None
     """The lowest value that is good, down from the system's own, which is good, too; None: none below it failed, or the
-    scan began elsewhere."""
+    system's own is not good, or not in the range."""
     refuted_limit: float | None
     """The lowest evaluated value of a random quantity at which so many seeds fail that `RELIABILITY` is refuted at the
     confidence; None: nothing is random, or there is none in the range."""

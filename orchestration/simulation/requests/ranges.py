@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
 
-from orchestration.components.fmi.read_description import Model
+from orchestration.components.fmi.read_description import Model, Variable
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.terminal import inform
@@ -92,7 +92,7 @@ def search_range(
 ) -> Range:
     """The range in which a limit is searched, by default a `share` of it; raises `UsageError` for an invalid one.
 
-    Without `first` it contains the value of the system itself, from which the search goes up and down.
+    From the value of the system itself, if that lies in it, the search goes up and down.
     """
     for flag, value in (("from", first), ("to", last), ("tolerance", tolerance), ("scan", scan)):
         if value is not None and not isinstance(value, Real):
@@ -111,7 +111,7 @@ def search_range(
     if known is not None and named is None and (first is None or last is None):
         inform(f"--of {varied.of}: searched from {low:g} to {high:g}{after(known.unit)}; --from and --to set others")
     before = known.before if known is not None and first is None else ()
-    own = varied.own if first is None else None
+    own = own_value(varied, models)
     step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
     return Range(
         own=own if own is not None and min((*before, low)) <= own <= high else None,
@@ -122,6 +122,20 @@ def search_range(
         tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
         unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)).strip() or None,
     )
+
+
+def own_value(varied: Varied, models: Mapping[str, Model]) -> float | None:
+    """The value that the unchanged system has, of a parameter that it does not set that of its FMU.
+
+    None: it has no number there, or several.
+    """
+    path, *others = varied.paths
+    if others or value_at(varied.system, path) is not None:
+        return varied.own
+    variable = _parameter_at(path, models)
+    if variable is None or variable.kind != "Real" or variable.start is None:
+        return None
+    return float(variable.start)
 
 
 def default_quantity(request: Request) -> str:
@@ -173,11 +187,9 @@ def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
     """The unit of the value at a path of a system; None if it has none or is unknown."""
     if is_in_seconds(path):
         return "s"
-    for name, model in models.items():
-        prefix = f"components.{name}.parameters."
-        variable = model.variables.get(path.removeprefix(prefix)) if path.startswith(prefix) else None
-        if variable is not None and variable.unit:
-            return variable.unit
+    variable = _parameter_at(path, models)
+    if variable is not None and variable.unit:
+        return variable.unit
     if (of_signal := _OF_SIGNAL.fullmatch(path)) is not None:
         units = {
             variable.unit
@@ -187,6 +199,13 @@ def unit_at(path: str, models: Mapping[str, Model]) -> str | None:
         }
         return units.pop() if len(units) == 1 else None
     return None
+
+
+def _parameter_at(path: str, models: Mapping[str, Model]) -> Variable | None:
+    """The variable of the FMU of a component whose parameter is at a path; None: there is none."""
+    prefixes = {f"components.{name}.parameters.": model for name, model in models.items()}
+    found = (m.variables.get(path.removeprefix(prefix)) for prefix, m in prefixes.items() if path.startswith(prefix))
+    return next(found, None)
 
 
 _OF_SIGNAL = re.compile(r"connections\.[^.]+\.(?:noise|quantisation)\.(.+)")

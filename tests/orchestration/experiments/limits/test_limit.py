@@ -34,6 +34,7 @@ from orchestration.simulation.requests.ranges import Varied, search_range
 from orchestration.simulation.runs.prepared import prepared
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.file import system_from_tables
+from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.local_limit import local_limits
@@ -155,11 +156,15 @@ def test_good_values_around_the_own_one_have_both_ends_and_those_apart_from_it_a
     assert ends_of_good(lambda value: value < 2.6, values, 3.0, 0.5) == Ends(Bracket(3.0, 2.5), None)
 
 
-def test_the_own_value_is_scanned_unless_the_start_is_given() -> None:
+def test_the_own_value_is_scanned_where_it_lies_in_the_range() -> None:
     varied = Varied(request=example("dc_servo", {"connections.command.delay": 0.0047}), of="connections.command.delay")
     span = search_range(varied, {}, first=None, last=None, tolerance=None, scan=None)
     assert (span.own, span.values()[:4]) == (0.0047, [0.0, 0.003, 0.0047, 0.006])
-    assert search_range(varied, {}, first=0.001, last=None, tolerance=None, scan=None).own is None
+    assert search_range(varied, {}, first=0.001, last=None, tolerance=None, scan=None).own == 0.0047
+    assert search_range(varied, {}, first=0.005, last=None, tolerance=None, scan=None).own is None
+    of_fmu = Varied(request=example("double_integrator"), of="components.controller.parameters.k_d")
+    models = files_of(of_fmu.system).models_of(of_fmu.system)
+    assert search_range(of_fmu, models, first=0.1, last=2.1, tolerance=None, scan=None).own == 1.0
 
 
 @pytest.mark.parametrize(("share", "last"), [(1.0, 5.0), (0.2, 1.0)])
@@ -653,8 +658,12 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
         "scanned from 5 ms to 55 ms, as a search ends soon after what fails: beyond that nothing is known" in found.note
     )
     from_below = limits.limit(scenario_of(), "period", first=0.005)
-    assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (None, None)
-    assert from_below.verdict.startswith("period not good even at 5 ms, where the scan begins: diverged; good again at")
+    assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (0.0315, 0.00625)
+    without_own = limits.limit(scenario_of(), "period", first=0.035)
+    assert without_own.verdict.startswith("period not good even at 35 ms, where the scan begins: diverged")
+    assert "with --from 0.01 --to 0.5 the search would go up and down from the file's own value" in without_own.note
+    bad_own = limits.limit(scenario_of(period=0.04), "period")
+    assert "the file's own value, 40 ms, is not good either" in bad_own.note
 
 
 @pytest.mark.parametrize(
