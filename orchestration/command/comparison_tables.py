@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
-from orchestration.experiments.comparison.cells import FATES, PEAK, VARIATION, CellSummary, Median, Share
+from orchestration.experiments.comparison.cells import FATES, PEAK, SETTLING, VARIATION, CellSummary, Median, Share
 from orchestration.experiments.comparison.design import Comparison
 from orchestration.experiments.comparison.fronts import Difference, Pair
 from orchestration.experiments.comparison.limits import GridLimit
@@ -96,7 +96,8 @@ def comparison_table(comparison: Comparison, outcome: Outcome) -> PrintedTable:
     return PrintedTable(
         caption=(
             f"Shares of {len(comparison.initial_conditions)} initial conditions that survive and settle, with 95 % "
-            f"Wilson intervals{by}; medians, with intervals of order statistics at 95 %"
+            f"Wilson intervals{by}; medians are of those alone that settle (settling time) or survive (residual), with "
+            "intervals of order statistics at 95 % and, in parentheses, their number"
         ),
         heads=[*columns],
         rows=[*zip(*columns.values())],
@@ -132,7 +133,10 @@ def _columns(comparison: Comparison, found: Sequence[tuple[CellSummary, Pair | N
             minus = f"minus {comparison.controllers[0].name}"
             columns[f"{fate}s, {minus}"] = [_share(pair.shares[fate], c.count) if pair else "" for c, pair in found]
     columns |= {
-        f"median {name.replace('_', ' ')} [{unit}]": [_median(c.medians[name], factor) for c in cells]
+        f"median {name.replace('_', ' ')} [{unit}]": [
+            f"{_median(c.medians[name], factor)} ({(c.settles if name == SETTLING else c.survives).count})"
+            for c in cells
+        ]
         for name, (unit, factor) in _UNITS.items()
     }
     return columns

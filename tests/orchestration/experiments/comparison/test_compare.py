@@ -301,6 +301,8 @@ def test_a_comparison_is_printed_as_a_table(
     if form != "csv":
         assert "Shares of 2 initial conditions" in "".join(lines)
         assert "minus coupled: of pairs from the same one" in "".join(lines)
+        assert " - (0) " in "".join(lines), "none of them settles"
+        assert "of those alone that settle" in "".join(lines)
         return
     cells = pd.read_csv(StringIO("\n".join(lines))).set_index(["loss", "period", "controller"])
     has = cells["survives.difference"].notna()
