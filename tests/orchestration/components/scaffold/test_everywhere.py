@@ -166,6 +166,7 @@ def test_fmus_checks_other_masters_and_limits_take_it_as_any_controller(
     assert "sampling = { period = 0.01 }    # sampled" in proposed
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_its_own_system_is_drawn_as_a_flight_and_searched_over_its_period_without_a_word(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, main: Main
 ) -> None:

@@ -376,6 +376,7 @@ def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     assert str(figure.get_label()).startswith("8 runs a cell; "), "its caption"
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_repeated_study_is_drawn_as_shares_and_exported_with_them(
     tmp_path: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:

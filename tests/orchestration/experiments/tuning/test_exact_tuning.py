@@ -48,7 +48,7 @@ def cost(K: float, Td: float) -> float:
 
 
 def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp_path: Path) -> None:
-    found = tuned(tuning(evaluations=40), tmp_path)
+    found = tuned(tuning(evaluations=30), tmp_path)
     (one,) = found.searches
     K, Td = (one.values[f"{GAINS}.{name}"] for name in ("K", "Td"))
     least = minimize(lambda x: cost(*x), (1.5, 0.035), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
@@ -59,7 +59,7 @@ def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp
     gains = read_toml(path, "gains")["components"]["controller"]["parameters"]
     assert gains == {"K": pytest.approx(K, rel=1e-5), "Td": pytest.approx(Td, rel=1e-5)}
     assert "evaluations of the exact expectation of (J)." in path.read_text()
-    assert tuned(tuning(evaluations=40), tmp_path).searches == found.searches
+    assert tuned(tuning(evaluations=30), tmp_path).searches == found.searches
 
 
 @in_test_all

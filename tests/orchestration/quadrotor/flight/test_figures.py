@@ -341,6 +341,7 @@ def test_the_spectrum_marks_the_rate_at_which_the_controller_samples(slow: Resul
         assert any(text.get_text().startswith("sampled at 33.3") for text in axes.texts)
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_the_spectrum_marks_the_rate_of_what_sends_the_command_by_any_name(slow: Result, tmp_path: Path) -> None:
     system = replace(slow.request.as_system(), objectives={}, optional=(), criterion=Criterion(), operating_point={})
     quadcosim.save_run(quadcosim.run(replace(system, stop_time=0.2)), tmp_path)
