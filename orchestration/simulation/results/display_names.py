@@ -36,16 +36,28 @@ def metric_with_unit(name: str, of: str | None) -> str:
 
 def setting(path: str) -> str:
     """The display name of a path of a scenario, system or study file: `period of pilot` for
-    `components.pilot.sampling.period`.
+    `components.pilot.sampling.period`, `execution of mcu's task control` for `computers.mcu.tasks.control.execution`.
+
+    A parameter keeps its name.
     """
     known = _known(path)
     if known is not None:
         return known[0]
     head, _, rest = path.partition(".")
     name, _, what = rest.partition(".")
-    if head in ("components", "connections", "sources") and what:
-        return f"{words(what.removeprefix('sampling.').removeprefix('parameters.'))} of {words(name)}"
+    if what.startswith("parameters."):
+        return f"{what.removeprefix('parameters.').replace('.', ' ')} of {words(name)}"
+    if (of_part := _OF_PART.fullmatch(path)) is not None:
+        return f"{words(of_part['what'])} of {of_part['owner']}'s {of_part['kind']} {of_part['part']}"
+    if head in ("components", "connections", "sources", "computers", "networks") and what:
+        return f"{words(what.removeprefix('sampling.'))} of {words(name)}"
     return words(rest) if head in ("timing", "controller", "plant") and rest else words(path)
+
+
+_OF_PART = re.compile(
+    r"(?:computers|networks)\.(?P<owner>[^.]+)\.(?P<kind>task|message)s\.(?P<part>[^.]+)\.(?P<what>.+)"
+)
+"""A path of a task of a computer, or of a message of a network"""
 
 
 def unit_of_setting(path: str) -> str | None:

@@ -172,7 +172,9 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
     known = list(tables[table])
     names = [name for name in known if rest.startswith(f"{name}.")]
     if not names:
-        raise UsageError(f"{path}: expected {table}.NAME.KEY with NAME one of {', '.join(known) or '(there is none)'}")
+        near = did_you_mean(rest.partition(".")[0], known)
+        listed = ", ".join(known) or "(there is none)"
+        raise UsageError(f"{path}: expected {table}.NAME.KEY with NAME one of {listed}{near}")
     name = max(names, key=len)
     key = rest[len(name) + 1 :]
     _expect_key(path, table, system, name, key)
