@@ -108,22 +108,22 @@ def locus(
     ] = None,
     first: Annotated[float | None, option("--from", "Its lowest value.", "A")] = None,
     last: Annotated[float | None, option("--to", "Its highest value.", "B")] = None,
-    count: Annotated[int, option("--count", "Values from the lowest to the highest.", "N")] = 40,
+    count: Annotated[int | None, option("--count", "Values from the lowest to the highest; default: 40.", "N")] = None,
     out: Folder = None,
     *,
     flags: FlightFlags,
 ) -> CommandResult:
     """Compute the poles of the sampled loop over a quantity, and where they leave the unit circle; draw them."""
-    from orchestration.theory.stability.poles import in_words
     from orchestration.theory.stability.root_locus import locus as locus_of
 
     found = locus_of(request_from(scenario, flags, timing), of, first=first, last=last, count=count)
     if out is not None:
         _draw(found.plot(), out)
-    rows = [("crossing", "value", "pole")]
+    rows = [("crossing", "value", "accuracy", "pole")]
     for one in found.crossings:
         way = "leaves" if one.leaves else "returns"
-        rows.append((way, found.place_of(one).removeprefix("at "), in_words(one.z)))
+        accuracy = "-" if one.accuracy is None else quantity(one.accuracy, found.unit, 2)
+        rows.append((way, found.place_of(one).removeprefix("at "), accuracy, found.pole_of(one)))
     each = [[[pole.real, pole.imag] for pole in some if pole == pole] for some in found.poles.tolist()]
     crossings = [
         {
@@ -133,6 +133,7 @@ def locus(
             "real": x.z.real,
             "imaginary": x.z.imag,
             "frequency": x.frequency,
+            "accuracy": x.accuracy,
         }
         for x in found.crossings
     ]

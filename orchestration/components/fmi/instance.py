@@ -34,7 +34,7 @@ NO_STATE = (
 
 
 A_FLOAT = "a whole number that a float holds: all are up to 2**53"
-"""Expectation of a number on its way through a run"""
+"""What is expected of a number on its way through a run"""
 
 
 def convert_value(variable: Variable, value: object, place: str) -> Value:

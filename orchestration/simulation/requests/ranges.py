@@ -15,9 +15,10 @@ from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.basics.unit_algebra import after
 from orchestration.simulation.results.quantities import is_in_seconds
 from orchestration.systems.system.component import TaskSampling
+from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import Distribution
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import TOP, changed, value_at
+from orchestration.systems.system.paths import TOP, changed, parameter_name, value_at
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 
 PERIOD = "period"
@@ -102,6 +103,10 @@ def search_range(
             raise UsageError(f"--{flag} {value}: expected a positive number")
     named = varied.request.range_of(varied.of)
     known = named or _range_by_period(varied)
+    for path in varied.paths:
+        name = parameter_name(path) or ""
+        if component_of(name) in models:
+            models[component_of(name)].variable(variable_of(name), path)
     if known is None and (first is None or last is None):
         raise UsageError(f"--of {varied.of}: expected --from and --to, between which it is searched")
     low = first if first is not None else known.first if known is not None else 0.0

@@ -3,8 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from dataclasses import replace
 from functools import cache
 from itertools import groupby, takewhile
 
@@ -19,23 +18,18 @@ from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit
 from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start
 from orchestration.theory.stability.operating_point import (
-    LONGEST_HYPERPERIOD,
     NotAnEquilibriumError,
-    beside_others,
     deterministic,
-    hyperperiod,
-    hyperperiod_of,
 )
-from orchestration.theory.stability.period_map import growth_of_loop
+from orchestration.theory.stability.period_map import OTHER_PULSE, growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
-from orchestration.theory.stability.sign_changes import short, zero_between
+from orchestration.theory.stability.several_rates import Commensurate, commensurate, narrowed
+from orchestration.theory.stability.sign_changes import short, uncertainty, zero_between
 
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
 LOOP_ZERO, TWINS_TOLERANCE = 1e-6, 0.2
 """Growth that counts as 0, as a share of that beyond the limit; tolerance as a share of that of the measured limit"""
 TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
-OTHER_PULSE = 0.25
-"""factor of the second pulse, whose growth is compared"""
 OTHER_SIZE = 100.0
 """Factor of the second pulse of twin runs, which has to confirm growth and decay"""
 DITHERED = 1.37
@@ -45,23 +39,8 @@ AGREE = 0.1
 NEAR = 0.1
 """Distance from the limit at which it has to, relative"""
 
-MOST_MULTIPLES = 200
-"""Most multiples of the other periods that are tried beside the values of the scan"""
-
 Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Commensurate:
-    """Values at which a loop of several rates repeats: of one that varies, only there it has a spectral radius."""
-
-    scan: list[float]
-    """the scan's own that are, and multiples of the other periods, at which it may be unstable between stable ones"""
-    longest_first: list[float]
-    """the same, the longest hyperperiod first: what is measured over a long one serves over shorter ones"""
-    fine: list[float]
-    """candidates between them"""
 
 
 def local_limits(varied: Varied, span: Range) -> LinearLimit:
@@ -91,7 +70,7 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
         return LinearLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
-    if _commensurate(at, span) is not None:
+    if commensurate(at, span.values()) is not None:
         return LinearLimit(reason=f"no local limit: several rates, and saved states do not suffice: {why}")
     try:
         found = _by_twins(at, span)
@@ -109,16 +88,16 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         growths[value] = found = growth_of_loop(at(value), instances, known=known)
         return found
 
-    rates = _commensurate(at, span)
+    rates = commensurate(at, span.values())
     found = _first_growth(growth, span, LOOP, None) if rates is None else _first_tried(growth, span, rates)
     code = of_code(are_in_double({name: one for name, (one, _, _) in known.items()}))
     found = replace(found, method=f"{LOOP}{code}")
-    if found.limit is None or found.accuracy is None:
+    limit = found.limit
+    if limit is None or found.accuracy is None:
         return found
-    below, above = (max(v for v in growths if v < found.limit), min(v for v in growths if v > found.limit))
-    slope = (growths[above] - growths[below]) / (above - below)
-    difference = abs(growth_of_loop(at(below), instances, OTHER_PULSE, known) - growths[below])
-    return replace(found, accuracy=found.accuracy + difference / slope)
+    near = min(growths, key=lambda value: abs(value - limit))
+    difference = abs(growth_of_loop(at(near), instances, OTHER_PULSE, known) - growths[near])
+    return replace(found, accuracy=found.accuracy + uncertainty(growths, limit, difference))
 
 
 def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
@@ -191,27 +170,6 @@ def _known_at_own(at: Callable[[float], System], span: Range, instances: Instanc
     return known
 
 
-def _commensurate(at: Callable[[float], System], span: Range) -> Commensurate | None:
-    """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period."""
-    beside, values = beside_others(at, span.first, span.last), span.values()
-    if beside is None:
-        return None
-    others, unit = beside
-
-    def multiples(period: Fraction) -> list[float]:
-        step = float(period) * unit
-        counts = range(math.ceil(values[0] / step), math.floor(span.last / step) + 1)
-        return [float(f"{k * step:.12g}") for k in counts]
-
-    added = sorted({value for period in others for value in multiples(period)})
-    few = added[:: math.ceil(len(added) / MOST_MULTIPLES)] if added else added
-    repeats = {value: hyperperiod_of(at(value)) for value in sorted({*values, *few})}
-    known = {value: period for value, period in repeats.items() if period is not None}
-    longest_first = sorted(known, key=known.__getitem__, reverse=True)
-    fine = multiples(hyperperiod(others) / LONGEST_HYPERPERIOD)
-    return Commensurate(scan=[*known], longest_first=longest_first, fine=fine)
-
-
 def _naming_values(growth: Growth, span: Range) -> Growth:
     """The same, whose errors say at which value there is no loop at rest, and what has been found before."""
     decays = list[float]()
@@ -249,7 +207,7 @@ def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimi
         return named(value) > 0.0
 
     ends = ends_of_good(grows, rates.scan, span.own, span.last)
-    lower, upper = (None if end is None or end.good is None else _narrowed(grows, end, rates) for end in ends)
+    lower, upper = (None if end is None or end.good is None else narrowed(grows, end, rates) for end in ends)
     runs = [
         [value for value, _ in run]
         for is_bad, run in groupby(sorted(tried.items()), key=lambda one: one[1] > 0.0)
@@ -277,36 +235,6 @@ def _by_secants(growth: Growth, span: Range, bracket: Bracket | None) -> Bracket
 
 def _middle(bracket: Bracket | None) -> float | None:
     return None if bracket is None or bracket.good is None else 0.5 * (bracket.good + bracket.bad)
-
-
-def _narrowed(grows: Callable[[float], bool], bracket: Bracket, rates: Commensurate) -> Bracket:
-    """The bracket bisected by the values of `fine` within it, until that before its good end is good, too.
-
-    Between values at which it is unstable, a loop may be stable at one, as at a multiple of another period.
-    """
-    good, bad = bracket
-    assert good is not None
-    down = bad < good
-    fine, scan = (sorted(values, reverse=down) for values in (rates.fine, rates.scan))
-
-    def before(values: list[float], end: float) -> list[float]:
-        return [x for x in values if (x > end if down else x < end)]
-
-    while True:
-        between = [x for x in before(fine, bad) if before([good], x)]
-        while between:
-            half = len(between) // 2
-            if grows(between[half]):
-                bad, between = between[half], between[:half]
-            else:
-                good, between = between[half], between[half + 1 :]
-        beside = before(fine, good)[-1:]
-        if not beside or not grows(beside[0]):
-            return Bracket(good, bad)
-        stable = next((x for x in reversed(before(scan, beside[0])) if not grows(x)), None)
-        if stable is None:
-            return Bracket(good, bad)
-        good, bad = stable, beside[0]
 
 
 def _first_growth(growth: Growth, span: Range, method: str, finer: float | None) -> LinearLimit:

@@ -4,7 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import LogFormatter, MultipleLocator
@@ -32,9 +34,13 @@ LOWEST_PHASE = -720.0
 ANGLES = (15.0, 30.0, 45.0, 90.0, 180.0)
 """Distances of ticks of a phase [°]: the least with which they are few"""
 ROWS = 3
-"""Rows of the labels of crossings, which stand in each in turn, above the curve"""
-ROW = 0.1
+"""Most rows of the labels of crossings, above the curve"""
+ROW = 0.12
 """Height of one, as a share of that of the curve"""
+WIDTH = 0.6
+"""Width of a character, as a share of its height"""
+PLAIN, DECADES = 1e3, 1.7
+"""Ratio of the ends of a logarithmic axis up to which its numbers are plain, and decades up to which there are more"""
 EDGE = 0.25
 """Share of the width, from a side, in which a label has no room towards it"""
 LEAST = 1e-12
@@ -147,14 +153,16 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     """The poles beside the unit circle, shaded by the quantity, and the spectral radius over it; crosses leave it."""
     across = setting(result.of if "." in result.of else f"timing.{result.of}", result.values, result.unit)
     known = result.poles[np.isfinite(result.poles)]
-    titles = ["×: where poles cross the circle"] * bool(result.crossings)
+    crossings = [one for one in result.crossings if not one.jumps]
+    titles = ["×: where poles cross the circle"] * bool(crossings) + ["○: as in the file"] * (result.own is not None)
+    titles = [", ".join(titles)] * bool(titles)
     if outside := int((np.maximum(np.abs(known.real), np.abs(known.imag)) > SHOWN).sum()):
         titles.append(f"not shown: {outside} of {len(known)} poles, up to |z| = {np.abs(known).max():.3g}")
     figure = style.figure((50.0 if style.is_wide else 90.0) + len(titles))
     rows = [["plane", "close"], ["over", "over"]] if style.is_wide else [["plane"], ["close"], ["over"]]
     panels: dict[str, Axes] = figure.subplot_mosaic(rows, height_ratios=[2.0] * (len(rows) - 1) + [1.0])
     plane, close, over = panels["plane"], panels["close"], panels["over"]
-    values = across.of(result.values)
+    values, is_wide = across.of(result.values), _has_logarithm(result)
     is_there = np.isfinite(result.poles) & (np.abs(result.poles) < 2.0 * SHOWN)
     poles = result.poles[is_there]
     shade = np.broadcast_to(values[:, None], result.poles.shape)[is_there]
@@ -162,8 +170,13 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
         axes.axhline(0.0, color=GREY, linewidth=0.5)
         axes.axvline(0.0, color=GREY, linewidth=0.5)
         axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=BLACK, linewidth=1.0))
-        dots = axes.scatter(poles.real, poles.imag, c=shade, cmap=SHADES, s=10.0, linewidths=0.0)
-        for one in result.crossings:
+        dots = axes.scatter(
+            poles.real, poles.imag, c=shade, cmap=SHADES, norm="log" if is_wide else None, s=10.0, linewidths=0.0
+        )
+        if result.own is not None:
+            own = result.poles[result.values == result.own]
+            axes.plot(own.real.ravel(), own.imag.ravel(), "o", color=BLACK, fillstyle="none", linestyle="none")
+        for one in crossings:
             axes.plot([one.z.real] * 2, [one.z.imag, -one.z.imag], "x", color=RED, linestyle="none")
         axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
     apart = np.sort(np.abs(known - 1.0))
@@ -172,7 +185,9 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     plane.set(xlim=(-SHOWN, SHOWN), ylim=(-SHOWN, SHOWN), title="\n".join(titles))
     close.set(xlim=(1.0 - half, 1.0 + half), ylim=(-half, half), title="about z = 1")
     close.locator_params(nbins=5)
-    figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
+    bar = figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
+    if is_wide:
+        _label_plainly(bar.ax.xaxis, values[-1] / values[0])
     _draw_radius(over, result, across)
     return figure
 
@@ -186,17 +201,56 @@ def _draw_radius(axes: Axes, result: RootLocus, across: Quantity) -> None:
     low, high = min(float(result.radius.min()), 1.0), max(float(result.radius.max()), 1.0)
     if is_wide := high > LINEAR:
         axes.set_yscale("log")
-        for formatted in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
-            formatted(LogFormatter(minor_thresholds=(1.0, 0.5)))
+        _label_plainly(axes.yaxis)
         low, high = math.log(max(low, LOWEST)), math.log(high)
-    rows, margin = min(ROWS, len(result.crossings)), 0.05 * (high - low)
-    top = high + margin + rows * ROW * (high - low)
-    places = np.array([low - margin, top, *(top - ROW * (high - low) * (np.arange(rows) + 0.9))])
+    if _has_logarithm(result):
+        axes.set_xscale("log")
+        _label_plainly(axes.xaxis, tried[-1] / tried[0])
+    labels = [across.text_of(one.value, one.digits) for one in result.crossings]
+    rows, lefts = _rows_of(axes, [float(across.of(one.value)) for one in result.crossings], labels)
+    count, margin = max((row + 1 for row in rows if row is not None), default=0), 0.05 * (high - low)
+    top = high + margin + count * ROW * (high - low)
+    places = np.array([low - margin, top, *(top - ROW * (high - low) * (np.arange(count) + 0.9))])
     lowest, highest, *texts = np.exp(places) if is_wide else places
     axes.set_ylim(lowest, highest)
-    for k, one in enumerate(result.crossings):
-        at, left = float(across.of(one.value)), one.value > result.values[0] + (1.0 - EDGE) * np.ptp(result.values)
-        axes.plot([at, at], [1.0, texts[k % ROWS]], color=RED, linewidth=1.0, linestyle=":")
+    for one, label, row, left in zip(result.crossings, labels, rows, lefts):
+        at = float(across.of(one.value))
         axes.plot(at, 1.0, "x", color=RED)
+        if row is None:
+            continue
+        axes.plot([at, at], [1.0, texts[row]], color=RED, linewidth=1.0, linestyle=":")
         beside: dict[str, Any] = {"xytext": (-4.0 if left else 4.0, 0.0), "ha": "right" if left else "left"}
-        axes.annotate(across.text_of(one.value, 4), (at, texts[k % ROWS]), textcoords="offset points", **beside)
+        axes.annotate(label, (at, texts[row]), textcoords="offset points", **beside)
+
+
+def _has_logarithm(result: RootLocus) -> bool:
+    return result.geometric and bool(result.values[0] > 0.0)
+
+
+def _label_plainly(axis: Axis, ratio: float = 1.0) -> None:
+    """Label a logarithmic axis with numbers, but over some decades with powers of ten; `ratio`: of its ends."""
+    for formatted in (axis.set_major_formatter, axis.set_minor_formatter) if ratio < PLAIN else ():
+        formatted(LogFormatter(minor_thresholds=(DECADES, 0.5)))
+
+
+def _rows_of(axes: Axes, places: list[float], labels: list[str]) -> tuple[list[int | None], list[bool]]:
+    """The row of each label, 0 is the uppermost, and whether it stands left of its place; None: there is no room.
+
+    No label lies over another, nor over the line that leads up to another.
+    """
+    character = WIDTH * rcParams["font.size"] / 72.0 * axes.figure.dpi / axes.bbox.width
+    taken, rows, lefts = [list[tuple[float, float]]() for _ in range(ROWS)], list[int | None](), list[bool]()
+    to_share = axes.transScale + axes.transLimits
+    for place, label in zip(places, labels):
+        share, width = float(to_share.transform((place, 1.0))[0]), character * (len(label) + 1)
+        lefts.append(left := share > 1.0 - EDGE)
+        low, high = (share - width, share) if left else (share, share + width)
+
+        def is_free(row: int) -> bool:
+            over = any(a < high and low < b for a, b in taken[row])  # noqa: B023
+            return not over and not any(a < share < b for under in taken[row:] for a, b in under)  # noqa: B023
+
+        rows.append(next((row for row in range(ROWS) if is_free(row)), None))
+        if rows[-1] is not None:
+            taken[rows[-1]].append((low, high))
+    return rows, lefts

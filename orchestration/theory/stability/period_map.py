@@ -30,6 +30,8 @@ from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, b
 
 MAX_STATES = 1000
 """states of a loop"""
+OTHER_PULSE = 0.25
+"""Factor of the second pulse, whose growth is compared"""
 
 
 def period_map(

@@ -3,14 +3,15 @@
 import math
 from collections.abc import Callable
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
+from orchestration.foundation.basics.bisection import Bracket, Range
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
@@ -32,16 +33,13 @@ from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, keep_start, whole_at_rest
 from orchestration.theory.stability.operating_point import (
-    LONGEST_HYPERPERIOD,
     NotAnEquilibriumError,
-    beside_others,
-    hyperperiod,
-    hyperperiod_of,
     longest_period,
 )
-from orchestration.theory.stability.period_map import period_map
-from orchestration.theory.stability.poles import Complexes, poles_of
-from orchestration.theory.stability.sign_changes import short, zero_between
+from orchestration.theory.stability.period_map import OTHER_PULSE, growth_of_loop, period_map
+from orchestration.theory.stability.poles import Complexes, in_words, poles_of
+from orchestration.theory.stability.several_rates import commensurate, narrowed
+from orchestration.theory.stability.sign_changes import short, uncertainty, zero_between
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.style import Figures
@@ -51,10 +49,15 @@ COUNT = 40
 SHARE = 0.2
 """Share of the range of a limit by default, farther than which nearly all loops have long left the circle"""
 MAX_COUNT = 10_000
+DECADE = 10.0
+"""Ratio of the ends of a range from which on its values are those of a geometric sequence"""
 ALIKE = 1e-8
 """Distance of the two sides of a jump of a delay, at most [s]"""
-DIGITS = 6
-"""Digits of its values in a sentence"""
+ON_CIRCLE = 1e-5
+"""Distance of a pole from the circle, from which it has jumped across"""
+ROUNDING = float(np.finfo(float).tiny)
+DIGITS, FEW = 6, 4
+"""Digits of its values in a sentence, at most, and where it is not known how many hold"""
 
 
 @passable
@@ -72,6 +75,21 @@ class Crossing:
     """The pole on the circle, or the one that has jumped out of it; of a pair the upper one."""
     frequency: float
     """Its frequency [rad/s], up to whole turns in a period: 0 of a pole at 1, half the sampling rate of one at -1."""
+    accuracy: float | None = None
+    """How far the value may be wrong, as pulses of another size show; None: not known, or poles jump"""
+
+    @property
+    def jumps(self) -> bool:
+        """Whether poles jump across the circle there: no value has one on it."""
+        return abs(abs(self.z) - 1.0) > ON_CIRCLE
+
+    @property
+    def digits(self) -> int:
+        """The digits of its value that hold."""
+        if self.jumps or not self.accuracy or not self.value:
+            return DIGITS if self.jumps or self.accuracy == 0.0 else FEW
+        places = math.floor(math.log10(abs(self.value))) - math.ceil(math.log10(2.0 * self.accuracy))
+        return min(DIGITS, max(1, places + 1))
 
 
 @passable
@@ -84,7 +102,8 @@ class RootLocus:
     unit: str | None
     """The unit of the quantity; None: it has none."""
     values: Floats
-    """Values of the quantity, in rising order, shape (n,)."""
+    """Values of the quantity, in rising order, shape (n,); that of the file is one of them where it lies in the range.
+    """
     radius: Floats
     """The spectral radius at each, shape (n,): below 1 small deviations decay. Of a period beside others it is per
     longest period, for that of all rates differs from value to value."""
@@ -92,6 +111,10 @@ class RootLocus:
     """The poles at each, shape (n, m), without those at 0, of what is forgotten; where there are fewer, NaN."""
     crossings: tuple[Crossing, ...]
     """Values at which poles cross the unit circle, in rising order."""
+    geometric: bool = False
+    """Whether values are of a geometric sequence, as over more than a decade."""
+    own: float | None = None
+    """That of the file; None: it lies outside, or there is none."""
     curve: Floats = field(repr=False)
     """All values that were tried, also beside jumps, and the spectral radius at each, shape (2, k); NaN: no poles."""
     in_double: tuple[str, ...] = ()
@@ -124,9 +147,14 @@ class RootLocus:
 
     def place_of(self, crossing: Crossing) -> str:
         """Where poles cross, in words: at a value, with the frequency, or between two where rates repeat together."""
-        ends = [quantity(value, self.unit, DIGITS) for value in sorted((crossing.value, crossing.until))]
+        ends = [quantity(value, self.unit, crossing.digits) for value in sorted((crossing.value, crossing.until))]
         jumps = ends[0] != ends[1] and not math.isclose(crossing.value, crossing.until, abs_tol=ALIKE)
         return f"between {' and '.join(ends)}" if jumps else f"at {ends[0]}, {crossing.frequency:.4g} rad/s"
+
+    def pole_of(self, crossing: Crossing) -> str:
+        """The pole on the circle, in words; of those that jump one outside, with its size and the value it is of."""
+        beyond = f" at {quantity(crossing.until, self.unit, DIGITS)}, |z| = {abs(crossing.z):.4g}"
+        return f"{in_words(crossing.z)}{beyond if crossing.jumps else ''}"
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
@@ -148,20 +176,22 @@ def locus(
     *,
     first: float | None = None,
     last: float | None = None,
-    count: int = COUNT,
+    count: int | None = None,
 ) -> RootLocus:
-    """The poles of a loop about its operating point, for `count` values of a quantity from `first` to `last`.
+    """The poles of a loop about its operating point, for values of a quantity from `first` to `last`.
 
     Quantities are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the period of
     the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
-    times that of the file, delays up to ten periods or twice that of the file. Holds and delays are included; jitter,
-    loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen, but for
-    jumps of a delay to a sampled component: both sides of each are tried. A period beside others crosses between two at
-    which all coincide.
+    times that of the file, delays up to ten periods or twice that of the file. Values are `count`, default 40, evenly
+    spaced, over more than a decade by equal factors, and the file's own. Of a period beside others they are those at
+    which all rates meet, of these or by default of the scan of `limit`, and multiples of the others; crossings are
+    between two such. Holds and delays are included; jitter, loss, noise and quantisation are left out. A pair of
+    crossings between two neighbouring values is not seen, but for jumps of a delay to a sampled component: both sides
+    of each are tried.
 
     Raises `UsageError` for an invalid quantity or range, and as `linearise` where no value has poles.
     """
-    if not 2 <= count <= MAX_COUNT:
+    if count is not None and not 2 <= count <= MAX_COUNT:
         raise UsageError(f"--count {count}: expected a number from 2 to {MAX_COUNT}")
     loaded, _ = single_run_execution(request_of(request), "auto")
     varied = Varied(request=loaded, of=of or default_quantity(loaded))
@@ -169,13 +199,21 @@ def locus(
     span = search_range(
         varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
     )
-    values = [short(float(value), span.unit) for value in np.linspace(span.values()[0], span.last, count)]
-    return isolated_call(files.fmus.values(), _root_locus, varied, values, span.unit)
+    return isolated_call(files.fmus.values(), _root_locus, varied, span, count)
 
 
-def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLocus:
+def _is_wide(first: float, last: float) -> bool:
+    """Whether the ends of a range are of one sign, and more than a decade apart."""
+    return first * last > 0.0 and not 1.0 / DECADE <= last / first <= DECADE
+
+
+def _spaced(span: Range, count: int, spaced: Callable[[float, float, int], Floats]) -> list[float]:
+    return [short(float(value), span.unit) for value in spaced(span.values()[0], span.last, count)]
+
+
+def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
     with errors_in_own_terms(varied.request), closing(Instances()) as instances:
-        system, known = rested(varied.request), KnownTangents()
+        unit, own, system, known = span.unit, span.own, rested(varied.request), KnownTangents()
         with suppress(UsageError):  # of one that is unstable, values from which it is stable may follow
             keep_start(system, instances, known)
         found: dict[float, tuple[Complexes, float]] = {}
@@ -183,17 +221,21 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         def at(value: float) -> System:
             return changed(system, dict.fromkeys(varied.paths, value))
 
-        def repeats(value: float) -> bool:
-            return hyperperiod_of(at(value)) is not None
+        def with_own(values: list[float]) -> list[float]:
+            if own is None or not values[0] < own < values[-1]:
+                return values
+            return sorted([own, *(value for value in values if not math.isclose(value, own))])
 
-        if not all(map(repeats, values)):
-            raise UsageError(_incommensurate(varied, system, values, repeats))
-
-        beside = beside_others(at, values[0], values[-1])
+        rates = commensurate(at, with_own(span.values() if count is None else _spaced(span, count, np.linspace)))
+        geometric = rates is None and _is_wide(span.values()[0], span.last)
+        spaced = _spaced(span, count or COUNT, np.geomspace if geometric else np.linspace)
+        values = with_own(spaced) if rates is None else rates.scan
+        if not values:
+            raise UsageError(f"{varied.of}: several rates, which repeat together at no value of the range")
 
         def radius_of(value: float) -> float:
             poles, period = found[value]
-            share = 1.0 if beside is None else float(longest_period(at(value))) / NANOSECONDS / period
+            share = 1.0 if rates is None else float(longest_period(at(value))) / NANOSECONDS / period
             return float(np.abs(poles).max(initial=0.0) ** share)
 
         def radius(value: float) -> float:
@@ -220,20 +262,40 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
             without.pop(value, None)
             return True
 
-        shortened, tried = _shortening(beside, unit), _beside_jumps(varied, system, values)
-        crossings = list[Crossing]()
+        tried, crossings = _beside_jumps(varied, system, values), list[Crossing]()
 
         def cross(below: float, above: float) -> None:
-            if {below, above} <= found.keys() and (radius(below) < 1.0) != (radius(above) < 1.0):
+            if not {below, above} <= found.keys() or (radius(below) < 1.0) == (radius(above) < 1.0):
+                return
+            inside, outside = sorted((below, above), key=radius)
+            if rates is not None:
+                narrowed(lambda value: radius(value) >= 1.0, Bracket(inside, outside), rates)
+            else:
                 ends = ((below, radius(below) - 1.0), (above, radius(above) - 1.0))
-                inside, outside = zero_between(lambda value: radius(value) - 1.0, shortened, *ends)
-                crossings.append(_crossing(inside, outside, *found[outside], leaves=radius(below) < 1.0))
+                inside, outside = zero_between(lambda value: radius(value) - 1.0, lambda x: short(x, unit), *ends)
+            crossings.append(crossing(inside, outside, leaves=radius(below) < 1.0))
+
+        def crossing(inside: float, outside: float, *, leaves: bool) -> Crossing:
+            poles, period = found[outside]
+            pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
+            frequency = abs(math.atan2(pole.imag, pole.real)) / period
+            one = Crossing(value=inside, until=outside, leaves=leaves, z=pole, frequency=frequency)
+            return one if one.jumps else replace(one, accuracy=accuracy_of(one))
+
+        def accuracy_of(one: Crossing) -> float | None:
+            growths = {value: math.log(max(radius(value), ROUNDING)) / found[value][1] for value in found}
+            growth = growths[one.until]
+            try:
+                error = abs(growth_of_loop(at(one.until), instances, OTHER_PULSE, known) - growth)
+            except UsageError:
+                return None
+            accuracy = uncertainty(growths, one.value, error + abs(growth)) + abs(one.until - one.value)
+            return accuracy if math.isfinite(accuracy) else None
 
         with progress_bar("poles") as report:
             # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
-            if not (
-                has_poles(tried[-1]) or has_poles(tried[0]) or isinstance(without[tried[0]], NotAnEquilibriumError)
-            ):
+            first = (tried[-1], own if own in tried else tried[0], tried[0])
+            if not (any(map(has_poles, first)) or isinstance(without[tried[0]], NotAnEquilibriumError)):
                 raise without[tried[-1]]
             for place in range(len(tried) - 2, -1, -1):
                 has_poles(tried[place])
@@ -245,6 +307,12 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
                 if below in found and value in without and has_poles(value):
                     cross(below, value)
                     cross(value, above)
+            known_before = 0
+            while rates is not None and known_before < len(found):  # narrowing may have found others between
+                known_before = len(found)
+                crossings.clear()
+                for below, above in pairwise(sorted(found.keys() | without.keys())):
+                    cross(below, above)
     refused, values = [value for value in values if value in without], [value for value in values if value in found]
     each = [found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
@@ -252,21 +320,12 @@ def _root_locus(varied: Varied, values: list[float], unit: str | None) -> RootLo
         row[: len(known_poles)] = known_poles
     curve = np.array([(x, radius_of(x) if x in found else math.nan) for x in sorted(found.keys() | without.keys())]).T
     return RootLocus(
-        of=varied.of, unit=unit, values=np.array(values), radius=np.array([radius_of(value) for value in values]),
-        poles=poles, crossings=tuple(sorted(crossings, key=lambda one: one.value)), curve=curve,
+        of=varied.of, unit=unit, own=own if own in values else None, values=np.array(values),
+        radius=np.array([radius_of(value) for value in values]), geometric=geometric, poles=poles,
+        crossings=tuple(sorted(crossings, key=lambda one: one.value)), curve=curve,
         in_double=are_in_double({name: one for name, (one, _, _) in known.items()}),
         without=tuple(str(without[value]) for value in refused),
     )  # fmt: skip
-
-
-def _shortening(beside: tuple[list[Fraction], float] | None, unit: str | None) -> Callable[[float], float]:
-    """The function to the nearest value that is tried: of a period `beside` others one at which they coincide."""
-    if beside is None:
-        return lambda value: short(value, unit)
-    whole = hyperperiod(beside[0])
-    fractions = (whole / count for count in range(LONGEST_HYPERPERIOD, 0, -1))
-    step = float(next(one for one in fractions if one.denominator == 1)) * beside[1]
-    return lambda value: short(step * round(value / step), unit)
 
 
 def _beside_jumps(varied: Varied, system: System, values: list[float]) -> list[float]:
@@ -284,31 +343,3 @@ def _beside_jumps(varied: Varied, system: System, values: list[float]) -> list[f
         sides = (round(jump + side, 9) for jump in jumps for side in SIDES)
         found.update(side for side in sides if values[0] <= side <= values[-1])
     return sorted(found)
-
-
-def _incommensurate(varied: Varied, system: System, values: list[float], repeats: Callable[[float], bool]) -> str:
-    """That some values have no hyperperiod, and a range of which all have one, in fractions of another period."""
-    without = sum(not repeats(value) for value in values)
-    others = [
-        one.sampling.period
-        for name, one in system.components.items()
-        if one.sampling is not None and f"components.{name}.sampling.period" not in varied.paths
-    ]
-    text = f"{varied.of}: for {without} of {len(values)} values the periods have no hyperperiod within twenty of the "
-    text += "longest: expected values commensurate with the other periods"
-    for fraction in range(LONGEST_HYPERPERIOD, 0, -1):
-        step = max(others, default=0.0) / fraction
-        if not step:
-            break
-        first, last = math.ceil(values[0] / step - 1e-9), math.floor(values[-1] / step + 1e-9)
-        count = last - first + 1
-        if 2 <= count <= len(values) and all(repeats(round(k * step, 9)) for k in range(first, last + 1)):
-            return f"{text}, as --from {first * step:g} --to {last * step:g} --count {count}"
-    return text
-
-
-def _crossing(value: float, until: float, poles: Complexes, period: float, *, leaves: bool) -> Crossing:
-    pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
-    return Crossing(
-        value=value, until=until, leaves=leaves, z=pole, frequency=abs(math.atan2(pole.imag, pole.real)) / period
-    )

@@ -1,6 +1,7 @@
 """Where functions of one number pass zero."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -13,6 +14,8 @@ TRIALS = 80
 """Most points that are tried"""
 SECANTS = 12
 """Points from which on a range is only halved, as it is where the function jumps"""
+STANDS_OUT = 10.0
+"""Factor on the error of a function, from which a value of it tells how steep it is"""
 
 
 def roots(of: Callable[[Floats], Floats], low: Floats, high: Floats) -> Floats:
@@ -58,3 +61,14 @@ def zero_between(
         stays = is_low
     inside, outside = sorted((low, high), key=lambda point: point[1])
     return inside[0], outside[0]
+
+
+def uncertainty(points: Mapping[float, float], zero: float, error: float) -> float:
+    """How far the zero of a function may lie from where it was found, as its values at `points` have this error.
+
+    How steep it is, the nearest points to either side tell whose values stand out of the error.
+    """
+    telling = [(x, y) for x, y in points.items() if x != zero and abs(y) > STANDS_OUT * error]
+    sides = [[point for point in telling if (point[0] > zero) == above] for above in (False, True)]
+    nearest = (min(side, key=lambda point: abs(point[0] - zero)) for side in sides if side)
+    return max((error * abs((x - zero) / y) for x, y in nearest), default=math.inf if error else 0.0)

@@ -10,7 +10,7 @@ from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.model import System
-from orchestration.theory.stability import local_limit
+from orchestration.theory.stability import local_limit, several_rates
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError, hyperperiod_of
 from orchestration.theory.stability.perturbed_runs import Growth
 
@@ -132,5 +132,5 @@ def test_a_period_among_several_rates_has_no_limit_beyond_a_value_that_is_unstab
     assert repeating == sorted(repeating, reverse=True), "a tangent over a long period serves shorter ones, too"
     assert none.limit is None
     assert none.reason.startswith("local: small deviations grow at none, of 15 values from 50 ms to 150 ms")
-    monkeypatch.setattr(local_limit, "hyperperiod_of", lambda system: None)
+    monkeypatch.setattr(several_rates, "hyperperiod_of", lambda system: None)
     assert "at no value of the scan" in local_limit.about_rest(two, SPAN).reason

@@ -2,20 +2,24 @@
 
 import dataclasses
 import json
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from orchestration.foundation.basics.bisection import Range
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import root_locus
+from orchestration.theory.stability.local_limit import about_rest
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
 from orchestration.theory.stability.root_locus import Crossing, RootLocus
+from orchestration.theory.stability.sign_changes import uncertainty
 from quadcosim import Timing, UsageError, bode, linearise, locus
 from tests.commands import Main
 from tests.examples.common import native_example as example
@@ -28,13 +32,13 @@ def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_mar
     file = EXAMPLES / "dc_servo" / "system.toml"
     values = ("--of", DELAY, "--from", "0", "--to", "0.02", "--count", "3")
     found = json.loads(main("locus", file, *values, "--native", "--json", "--out", tmp_path).stdout)
-    assert found["values"] == [0.0, 0.01, 0.02]
+    assert found["values"] == [0.0, 0.002, 0.01, 0.02]
     assert found["verdict"] == (
         f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations)"
     )
     servo = example("dc_servo")
     below = locus(servo, DELAY, first=0.0, last=0.01, count=2).verdict
-    assert below.startswith(f"{DELAY}: poles inside the unit circle at each of 2 values from 0 s to 10 ms, spectral ")
+    assert below.startswith(f"{DELAY}: poles inside the unit circle at each of 3 values from 0 s to 10 ms, spectral ")
     (crossing,) = found["crossings"]
     assert crossing["value"] - 0.002 == pytest.approx(bode(servo).loops[0].delay_margin, abs=2e-8)
     assert np.hypot(crossing["real"], crossing["imaginary"]) == pytest.approx(1.0, abs=1e-6)
@@ -42,9 +46,9 @@ def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_mar
     loop = linearise(changed(servo, {DELAY: 0.02}))
     control = pytest.importorskip("control")
     closed = control.feedback(loop.component.to_control() * loop.rest.to_control(), sign=1)
-    poles = np.sort_complex([complex(*pole) for pole in found["poles"][2]])
+    poles = np.sort_complex([complex(*pole) for pole in found["poles"][3]])
     assert poles == pytest.approx(np.sort_complex(closed.poles()), abs=1e-6)
-    assert found["radius"][2] == pytest.approx(loop.radius, rel=1e-9)
+    assert found["radius"][3] == pytest.approx(loop.radius, rel=1e-9)
     assert (tmp_path / "locus.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -59,10 +63,10 @@ def test_values_without_poles_take_nothing_from_the_others(monkeypatch: pytest.M
     monkeypatch.setattr(root_locus, "whole_at_rest", refusing)
     worst = 0.015
     found = locus(example("dc_servo"), DELAY, first=0.0, last=0.028, count=3)
-    assert found.values.tolist() == [0.0, 0.014]
+    assert found.values.tolist() == [0.0, 0.002, 0.014]
     assert found.verdict == (
         f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations); "
-        f"no poles at 1 of 3 values, as {DELAY} = 0.028: no rest"
+        f"no poles at 1 of 4 values, as {DELAY} = 0.028: no rest"
     )
     worst = -1.0
     with pytest.raises(UsageError, match=f"{DELAY} = 0.028: no rest"):
@@ -113,6 +117,11 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
     of_all = hyperperiod_of(changed(both, {period: crossing.until}))
     assert of_all is not None
     (per_longest,) = found.curve[1][found.curve[0] == crossing.until]
+    assert f"at {1e3 * crossing.until:g} ms, |z| = {abs(crossing.z):.4g}" in found.pole_of(crossing)
+    limit = about_rest(
+        lambda value: changed(both, {period: value}), Range(first=0.008, step=0.016, last=0.024, tolerance=1.0)
+    )
+    assert (limit.limit, limit.accuracy) == pytest.approx((crossing.value + 0.0002, 0.0002), rel=1e-6)
     assert per_longest == pytest.approx(after ** (1e9 * max(crossing.until, 0.008) / float(of_all)), rel=1e-6)
 
 
@@ -121,17 +130,43 @@ def test_a_locus_of_one_value_is_refused() -> None:
         locus(example("dc_servo"), DELAY, first=0.0, last=0.02, count=1)
 
 
-def test_periods_that_never_coincide_are_refused_with_values_that_do() -> None:
-    system = example("dc_servo")
-    slow = dataclasses.replace(system.components["controller"], sampling=Sampling(period=0.012))
-    several = dataclasses.replace(system, components={**system.components, "other": slow})
-    with pytest.raises(UsageError, match=r"for 2 of 5 values .* as first 0\.004 last 0\.012 count 5"):
-        locus(several, "components.controller.sampling.period", first=0.0021, last=0.0123, count=5)
+def test_over_decades_the_own_value_is_tried_and_crossings_are_at_the_gain_margins() -> None:
+    """Of a gain that only the FMU sets, to 0.96: at both ends the loop is unstable."""
+    found = locus(example("dc_servo"), "components.controller.parameters.K", first=0.01, last=100.0, count=3)
+    assert found.values.tolist() == [0.01, 0.96, 1.0, 100.0]
+    assert (found.own, found.geometric) == (0.96, True)
+    margins = bode(example("dc_servo")).loops[0].gain_margins
+    assert [one.value for one in found.crossings] == pytest.approx([0.96 * one.factor for one in margins], rel=1e-5)
+    assert [one.leaves for one in found.crossings] == [False, True]
+    assert all(one.accuracy is not None and one.accuracy < 1e-5 for one in found.crossings)
+    even = locus(example("dc_servo"), "components.controller.parameters.K", first=2.0, last=20.0, count=3)
+    assert (even.values.tolist(), even.own, even.geometric) == ([2.0, 11.0, 20.0], None, False)
+
+
+def test_a_crossing_has_the_digits_that_its_accuracy_bears() -> None:
+    def digits(value: float, accuracy: float | None, z: complex = 1.0) -> int:
+        return Crossing(value=value, until=value, leaves=True, z=z, frequency=0.0, accuracy=accuracy).digits
+
+    assert [digits(10.6064, each) for each in (1.3e-3, 6e-4, 4e-4, 1e-9, None)] == [4, 4, 5, 6, 4]
+    assert digits(10.6064, None, 1.05) == 6
+    # A function 2 (x - 3) with an error of 0.01 at each point: points nearer than its error tell nothing.
+    points = {x: 2.0 * (x - 3.0) + 0.01 for x in (0.0, 2.0, 2.999, 3.0, 4.0)}
+    assert uncertainty(points, 2.995, 0.01) == pytest.approx(0.005, rel=0.02)
+    assert uncertainty({1.0: 0.01}, 1.0, 0.01) == np.inf
+
+
+def test_a_name_that_does_not_exist_is_told_before_a_range_is_asked_for() -> None:
+    servo = example("dc_servo")
+    with pytest.raises(UsageError, match=r"parameters\.perod: .* did you mean period"):
+        locus(servo, "components.controller.parameters.perod")
+    with pytest.raises(UsageError, match=r"did you mean controller\?"):
+        locus(servo, "components.contoller.parameters.k_p")
 
 
 def test_a_wide_locus_has_its_labels_in_the_panel_and_says_how_many_poles_lie_beyond_another() -> None:
+    places = (0.27, 0.98, 1.02, 1.05, 10.0, 49.5)
     values, radius = np.array([0.0, 1.0, 50.0]), np.array([0.98, 1.0, 45.0])
-    crossings = [Crossing(value=x, until=x, leaves=True, z=1.0, frequency=0.0) for x in (0.27, 0.98, 1.02, 10.0, 49.5)]
+    crossings = [Crossing(value=x, until=x, leaves=True, z=1.0, frequency=0.0) for x in places]
     found = RootLocus(
         of="components.controller.parameters.gain", unit=None, values=values, radius=radius,
         poles=radius[:, None].astype(complex), crossings=tuple(crossings), curve=np.array([values, radius]),
@@ -141,8 +176,9 @@ def test_a_wide_locus_has_its_labels_in_the_panel_and_says_how_many_poles_lie_be
     over, plane = figure.axes[2], figure.axes[0]
     assert over.get_yscale() == "log"
     assert plane.get_title().endswith("not shown: 1 of 3 poles, up to |z| = 45")
+    assert [text.get_text() for text in over.texts] == ["0.27", "0.98", "1.02", "10", "49.5"]  # no room for a fourth
     labels = [text.get_window_extent() for text in over.texts]
-    assert len(labels) == len(crossings)
+    assert not any(one.overlaps(other) for one, other in combinations(labels, 2))
     panel, curve = over.get_window_extent(), over.transData.transform((50.0, 45.0))[1]
     for label in labels:
         assert panel.x0 <= label.x0 < label.x1 <= panel.x1

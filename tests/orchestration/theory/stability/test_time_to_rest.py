@@ -93,7 +93,7 @@ def test_gains_that_are_unstable_have_poles_at_a_rest_that_no_run_finds(servo: S
 def test_a_range_whose_ends_and_own_value_do_not_come_to_rest_begins_from_one_that_does(servo: System) -> None:
     gain = "components.controller.parameters.K"
     found = locus(changed(servo, {gain: 4.0}), gain, first=0.2, last=3.1, count=3)
-    given = locus(native_example("dc_servo"), gain, first=0.2, last=3.1, count=3)
+    given = locus(changed(native_example("dc_servo"), {gain: 4.0}), gain, first=0.2, last=3.1, count=3)
     assert found.radius == pytest.approx(given.radius, rel=1e-6)
 
 
