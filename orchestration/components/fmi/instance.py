@@ -11,7 +11,7 @@ from fmpy.model_description import ModelDescription
 
 from orchestration.components.fmi.access import USUAL, Access
 from orchestration.components.fmi.read_description import Kind, Model, Variable
-from orchestration.foundation.basics.errors import QuadcosimError, UsageError, expected_name, shown
+from orchestration.foundation.basics.errors import A_FLOAT, QuadcosimError, UsageError, expected_name, shown
 from orchestration.foundation.basics.simulator import Floats, Simulator
 
 Value: TypeAlias = float | bool | str
@@ -31,10 +31,6 @@ NO_STATE = (
     "many tools that export FMUs"
 )
 """The words about an FMU whose state is to be saved, but cannot be"""
-
-
-A_FLOAT = "a whole number that a float holds: all are up to 2**53"
-"""What is expected of a number on its way through a run"""
 
 
 def convert_value(variable: Variable, value: object, place: str) -> Value:

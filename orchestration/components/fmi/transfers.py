@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orchestration.components.fmi.instance import A_FLOAT, number_of
+from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.read_description import Model, Variable
-from orchestration.foundation.basics.errors import SimulatorError
+from orchestration.foundation.basics.errors import A_FLOAT, SimulatorError
 from orchestration.foundation.basics.simulator import Floats
 
 Numbers = npt.NDArray[Any]

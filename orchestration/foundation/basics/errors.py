@@ -12,6 +12,8 @@ MAX_MESSAGE_LENGTH = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
 WHOLE_NUMBER = "a whole number from -2^63 to 2^63 - 1, or a float, as 1e19"
 """The words for what may be in place of a longer whole number"""
+A_FLOAT = "a whole number that a float holds: all are up to 2**53"
+"""The words for what of an integer of 64 bits a run can have"""
 
 Value = TypeVar("Value")
 

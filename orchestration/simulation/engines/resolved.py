@@ -24,7 +24,7 @@ from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
 from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants, instance_of
-from orchestration.systems.system.connection import MOTION, Source, variable_of
+from orchestration.systems.system.connection import MOTION, Source, component_of, variable_of
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.placement import tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms
@@ -116,6 +116,8 @@ def check_against_fmus(system: System, models: Mapping[str, Model]) -> CheckedSy
     words, system = describe_references(system, models), connect_references(system, models)
     for name, component in system.components.items():
         _expect_clock(name, component, models[name])
+    for source in system.sources.values():
+        _expect_exact(source, models)
     parameters = numeric_parameters(system, models)
     of_jobs: dict[str, float] = {}
     if job_terms(text for _, text in expressions(system)):
@@ -143,6 +145,24 @@ def columns_of(system: System) -> tuple[str, ...]:
     applied = [end for x in system.connections for end in x.end if system.components[x.receiver].sampling is None]
     of_sources = [signal for name, source in system.sources.items() for signal in source.signals(name)]
     return ("time", *dict.fromkeys((*applied, *exchanged, *of_sources)))
+
+
+def _expect_exact(source: Source, models: Mapping[str, Model]) -> None:
+    """Raise `UsageError` for a number in the file of a source that a 64-bit integer would have rounded."""
+    if source.file is None or source.is_motion:
+        return
+    types = [models[component_of(end)].variables[variable_of(end)].type for end in source.to]
+    wide = [
+        column
+        for column, type in zip(source.columns or [variable_of(end) for end in source.to], types)
+        if type in ("Int64", "UInt64")
+    ]
+    if wide:
+        from orchestration.systems.signals.table_file import read_rows
+
+        rows = read_rows(source.file, wide)
+        for column in wide:
+            rows.expect_exact(column)
 
 
 def _expect_clock(name: str, component: Component, model: Model) -> None:

@@ -255,7 +255,6 @@ def _expect_numbers_of_type(model: Model, inputs: Path, columns: Mapping[str, st
         if variable.kind in ("Integer", "Enumeration") and (values % 1.0).any():
             raise rows.error(int((values % 1.0 != 0.0).argmax()), column, f"a whole number: it is an {variable.type}")
         if variable.kind == "Integer":
-            for at in (i for each, i in rows.rounded if each == column):
-                raise rows.error(at, column, "a whole number that a float holds: all are up to 2**53")
+            rows.expect_exact(column)
             for at in (int(values.argmin()), int(values.argmax())):
                 convert_value(variable, float(values[at]), f"{inputs}: line {rows.lines[at]}: {column}")

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from orchestration.foundation.basics.documents import readable
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import A_FLOAT, UsageError, shown
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, seconds
 
@@ -37,6 +37,11 @@ class TableRows:
         """The error for an invalid value."""
         value = shown(self.rounded.get((column, row), float(self.columns[column][row])))
         return UsageError(f"{self.path}: line {self.lines[row]}: {column} = {value}: expected {expected}")
+
+    def expect_exact(self, column: str) -> None:
+        """Raise `UsageError` for a large number of a column that no float is."""
+        for row in (at for name, at in self.rounded if name == column):
+            raise self.error(row, column, A_FLOAT)
 
     def expect_increasing_times(self, *, jumps: bool = False) -> None:
         """Raise `UsageError` for a time that is not later than the one before; with `jumps` it may equal that.

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import field, replace
 from pathlib import Path
+from typing import Annotated, Any
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import A_FLOAT, UsageError
+from orchestration.foundation.basics.fitting import Before
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.signals import WINDS
@@ -132,6 +134,15 @@ MOTION = tuple(f"{each}.{axis}" for each in ("position", "velocity", "accelerati
 """The values of a motion, in its order"""
 
 
+def _exact(value: Any) -> Any:
+    """The value; raises the `ValueError` that Pydantic has words for where a float would round a whole number."""
+    if type(value) is int and abs(value) < 2**64 and float(value) != value:
+        from pydantic_core import PydanticCustomError
+
+        raise PydanticCustomError("exact", f"Input should be {A_FLOAT}")
+    return value
+
+
 @record()
 class Source:
     """What drives inputs from outside: a constant, a file, white noise, a signal by name or the built-in trajectory.
@@ -143,7 +154,7 @@ class Source:
 
     to: tuple[str, ...] = ()
     """The inputs that it feeds, as COMPONENT.VARIABLE; empty for a motion that only objectives use."""
-    constant: float | None = None
+    constant: Annotated[float | None, Before(_exact)] = None
     """A constant value, in the unit of the inputs."""
     file: Path | None = None
     """The path of a CSV file with `time` [s] and one column for each input, named as the input without its component,

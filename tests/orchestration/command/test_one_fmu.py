@@ -214,7 +214,7 @@ def test_points_are_refused_where_no_step_ends_at_them(here: Path) -> None:
 
 
 @needs_compiler
-def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_from_a_file(
+def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_a_file_and_a_source(
     main: Main, here: Path
 ) -> None:
     inputs, big = here / "big.csv", '<Int64 name="big" valueReference="9" causality="input" start="0"/>'
@@ -230,6 +230,13 @@ def test_a_whole_number_that_a_float_does_not_hold_is_refused_from_a_flag_and_fr
     inputs.write_text(f"time,big\n0,1\n1,{2**63 - 1}\n")
     refused = main("run", fmu, "--in-process", "--inputs", inputs, code=2).stderr
     assert f"big.csv: line 3: big = {2**63 - 1}: expected a whole number that a float holds" in refused
+    system: dict[str, Any] = {"stop_time": 1.0, "components": {"it": {"fmu": str(fmu), "step": 0.5}}}
+    for source, place in (
+        ({"file": "big.csv"}, "big.csv: line 3: big"),
+        ({"constant": 2**63 - 1}, "sources.s.constant"),
+    ):
+        with pytest.raises(UsageError, match=rf"{place} = {2**63 - 1}: expected a whole number that a float holds"):
+            run(system | {"sources": {"s": {"to": ["it.big"], **source}}}, in_process=True)
     inputs.write_text(f"time,big\n0,{-(2**63)}\n1,{2**62}\n")
     main("run", fmu, "--in-process", "--inputs", inputs, "--stop-time", "1")
 
