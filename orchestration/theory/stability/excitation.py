@@ -15,10 +15,12 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability.operating_point import AT_REST
 
-PULSE = 1e-6
+PULSE = 2.0**-20
 """Pulse of an input, up and down, with which the search for the best one begins: relative to its value, or absolute
-where that is smaller than 1"""
-MIN_PULSE, MAX_PULSE = 1e-24, 1.0
+where that is smaller than 1. It and the others are powers of two, which the sum with the value does not round"""
+FINER = 2.0**-3
+"""Factor from one to the next"""
+MIN_PULSE, MAX_PULSE = 2.0**-80, 1.0
 """Ends of that search: only of an instance that rests at 0 rounding lets the response to the smallest be seen"""
 LOST = 1e-9
 """Pulse from which on smaller ones may be lost in rounding without a sign of it, as none is linear, too"""
@@ -39,7 +41,7 @@ COARSER = 1e-11
 """Difference of the outputs then, which double precision rounds by less"""
 STANDS_OUT = 10.0
 """Factor on errors: what is larger is none"""
-DITHER = (1.0, 1.137, 1.291, 1.443)
+DITHER = (1.0, 1.140625, 1.296875, 1.453125)
 """Factors of the pulses that show it: rounded alike at two sizes, responses may agree by chance"""
 FOLLOWS = 0.05
 """Share of the largest response of an output, from which it follows an input"""
@@ -117,7 +119,7 @@ class Excitation:
     def __init__(self, rest: Rest) -> None:
         self.inputs, self.outputs = rest.inputs, rest.outputs
         self.pulse, self.largest = PULSE, MAX_DEVIATION
-        self.scale = np.maximum(1.0, np.abs(rest.held))
+        self.scale = np.exp2(np.floor(np.log2(np.maximum(1.0, np.abs(rest.held)))))
         self._fmu, self.held, self._inputs_now = rest.fmu, rest.held, rest.held.copy()
         self._write = rest.fmu.writer(rest.inputs, self._inputs_now)
         self._outputs_now: Floats = np.zeros(len(rest.outputs))
@@ -281,7 +283,7 @@ class Excitation:
             for self.pulse in (pulse for pulse in LARGER if pulse > chosen):
                 follows = np.abs(self.response(i, rungs)).max(axis=0, initial=0.0)
                 if (follows > FOLLOWS * usual).any():
-                    what = f"follows a change of {self.inputs[i]} by {self.pulse:g}, but not by {chosen:g}"
+                    what = f"follows a change of {self.inputs[i]} by {self.pulse:g}, but not by {chosen:.1g}"
                     raise self._imprecise(what)
 
     # -- how far it is linear -------------------------------------------------------------------------------------
@@ -291,24 +293,27 @@ class Excitation:
 
         It is the pulse that is linear for longest, and of these the one to whose size and another responses agree best:
         smaller ones are lost in rounding. The search goes upward only from responses that are linear, and down, of a
-        response that grows, while a smaller one is linear for no shorter.
+        response that grows, while a smaller one is linear for no shorter, and where the first is.
         """
         tried = {PULSE: self._nonlinearity(rungs, PULSE)}
         early, pulse = len(tried[PULSE]) // 3, PULSE
         rounding = tried[PULSE][early]
-        while (pulse := 10.0 * pulse) <= MAX_PULSE:
+        while (pulse := pulse / FINER) <= MAX_PULSE:
             tried[pulse] = self._nonlinearity(rungs, pulse)
             if len(tried[pulse]) <= early or not tried[pulse][early] < rounding:
                 break
             rounding = tried[pulse][early]
         linear = {size: _linear(tried[size], max(NONLINEAR, LEAST * rounding)) for size in tried}
-        best = max(linear, key=lambda size: linear[size])
+        best, first = max(linear, key=lambda size: linear[size]), linear[PULSE][0]
         pulse = min(best, PULSE)
-        while linear[pulse][0] == linear[best][0] < len(rungs) and 0.1 * pulse >= MIN_PULSE:
-            tried_before, pulse = pulse, 0.1 * pulse
+        while linear[pulse][0] == linear[best][0] < len(rungs) and FINER * pulse >= MIN_PULSE:
+            tried_before, pulse = pulse, FINER * pulse
             if pulse < LOST and not self._responds_alike(rungs[: linear[best][0] + 1], pulse, tried_before):
                 break
-            linear[pulse] = _linear(self._nonlinearity(rungs, pulse), max(NONLINEAR, LEAST * rounding))
+            smaller, allowed = self._nonlinearity(rungs, pulse, rounded=True), max(NONLINEAR, LEAST * rounding)
+            if smaller[max(0, first - 1) : first].max(initial=0.0) > allowed:
+                break
+            linear[pulse] = _linear(smaller, allowed)
             best = max(best, pulse, key=lambda size: linear[size][0])
         self.pulse = best
         return linear[best][0]
@@ -323,17 +328,21 @@ class Excitation:
                 return False
         return True
 
-    def _nonlinearity(self, rungs: Sequence[Rung], pulse: float) -> Floats:
-        """The difference of responses to two sizes, relative to the largest so far, up to each rung."""
+    def _nonlinearity(self, rungs: Sequence[Rung], pulse: float, *, rounded: bool = False) -> Floats:
+        """The difference of responses to two sizes, relative to the largest so far, up to each rung.
+
+        At least that by which outputs are `rounded`, which may be alike at both.
+        """
         self.pulse, courses = pulse, []
         for i in range(len(self.inputs)):
             once, other = self._two_sizes(i, rungs, self.response)
-            largest, apart = (np.abs(each).max(axis=1, initial=0.0) for each in (once, once - other))
+            largest = np.abs(once).max(axis=1, initial=0.0)
+            apart = np.maximum(np.abs(once - other), self._rounded if rounded else 0.0).max(axis=1, initial=0.0)
             courses.append((np.maximum.accumulate(apart), np.maximum.accumulate(largest)))
         count = min(map(len, (apart for apart, _ in courses)), default=len(rungs))
         found: Floats = np.zeros(count)
         for apart, largest in courses:
-            found = np.maximum(found, apart[:count] / np.where(largest[:count] > 0.0, largest[:count], 1.0))
+            found = np.maximum(found, apart[:count] / np.where(largest[:count] > 0.0, largest[:count], np.inf))
         return found
 
     def _two_sizes(self, i: int, rungs: Sequence[Rung], response: Callable[..., Floats]) -> tuple[Floats, Floats]:
@@ -349,8 +358,12 @@ class Excitation:
             once, other = self._two_sizes(i, twice, self.followed_response)
             values[i] = np.inf  # where one is too large to be followed
             values[i, : len(once)] = np.abs(once - other)
-        rounded = ROUNDING * np.abs(self.at_rest) / self.weight / self.pulse
-        return Errors(times=np.cumsum([rung.duration for rung in twice]), values=np.maximum(values, rounded))
+        return Errors(times=np.cumsum([rung.duration for rung in twice]), values=np.maximum(values, self._rounded))
+
+    @property
+    def _rounded(self) -> Floats:
+        """The error of a response by rounding of each output."""
+        return np.asarray(ROUNDING * np.abs(self.at_rest) / self.weight / self.pulse)
 
     def longest_step(self, own: float, most: float) -> float:
         """The longest step [s] that is like two of half its length: the `own` one times a power of two."""

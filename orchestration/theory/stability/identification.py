@@ -35,7 +35,7 @@ LARGER = 10.0
 """Factor on it where the error is larger"""
 FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""
-SHRUNK = (1.0, 0.3, 0.1)
+SHRUNK = (1.0, 0.125, 0.015625)
 """Factors on the pulses, tried in turn"""
 FEWEST = 6
 """Samples at which its states are produced at least"""

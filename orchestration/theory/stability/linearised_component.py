@@ -35,6 +35,8 @@ UNPROVEN = 1e-5
 """Error of a predicted response, relative to the largest of that output, from which a linear model is refused"""
 PROOF_STEPS = 256
 """Steps of the random input, at most"""
+PARTS = 64
+"""Parts of a pulse, of which it has random numbers: a power of two, which is not rounded beside the input at rest"""
 HELD_STEPS = 1024
 """Samples over which inputs are held to see slow states, at most"""
 HELD_SHARES = (1.0, 0.1, 0.01, 0.001)
@@ -181,7 +183,7 @@ class Tangent(LinearSimulator):
         h, duration = self._proof
         rung, rng = self._rung(h), np.random.default_rng(0)
         count = _steps(h, duration)
-        moves = rng.uniform(-1.0, 1.0, (count, len(self.inputs))) * self._excitation.pulses
+        moves = rng.integers(-PARTS, PARTS, (count, len(self.inputs))) / PARTS * self._excitation.pulses
         moves[(count + 1) // 2 :] = 0.0
         measured, predicted = excitation.response_to(moves, rung), np.zeros((count, len(self.outputs)))
         by_state, by_input = self.derivatives(h)
@@ -277,8 +279,9 @@ class Tangent(LinearSimulator):
         self._axes, chosen, self._back = found
         if ranks[-1] == min(len(columns), len(self._axes)):
             raise UsageError(
-                f"{excitation.name}: has more states than {len(ranks)} pulses and {len(ladder)} steps show: expected "
-                "fewer, or a response that stays small and linear for longer, as with a shorter period"
+                f"{excitation.name}: has {ranks[-1]} states or more, as {len(ranks)} pulses and {len(ladder)} steps "
+                "show no more: expected fewer, or a response that stays small and linear for longer, as with a shorter "
+                "period"
             )
         self._produced = [produced[k] for k in chosen]
         self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))
