@@ -22,7 +22,7 @@ from orchestration.theory.stability.operating_point import (
     deterministic,
 )
 from orchestration.theory.stability.period_map import OTHER_PULSE, growth_of_loop
-from orchestration.theory.stability.perturbed_runs import growth_of
+from orchestration.theory.stability.perturbed_runs import growth_of, repeating_period
 from orchestration.theory.stability.several_rates import Commensurate, commensurate, narrowed
 from orchestration.theory.stability.sign_changes import short, uncertainty, zero_between
 
@@ -116,7 +116,8 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
         found = _first_growth(growth, span, TWINS, TWINS_TOLERANCE)
         if found.limit is None:
             return found
-        near = _beside(found.limit, growth, growths, span, (False, True))
+        end = found.limit
+        near = _beside(end, growth, growths, span, (False, True))
         first, alike = [growth(value) for value in near], [_rate(at, instances, known, DITHERED, v) for v in near]
         if max(abs(a - b) for a, b in zip(first, alike)) <= AGREE * abs(first[1] - first[0]) and all(
             (_rate(at, instances, known, OTHER_SIZE, value) > 0.0) == grows
@@ -125,6 +126,13 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
             for value, grows in zip(_beside(end, growth, growths, span, both), both)
         ):
             return replace(found, limit=_as_accurate(found.limit, found), lower=_as_accurate(found.lower, found))
+    for value in sorted(near, key=lambda value: abs(value - end)):
+        if repeating_period(deterministic(at(value))) is None:
+            return LinearLimit(
+                reason=f"no local limit: at {span.text(value)} the schedule of computers and networks is not known to "
+                "repeat, so that no law of one period says whether small deviations grow: expected values at which it "
+                "repeats soon, as expect tells"
+            )
     return LinearLimit(
         reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
         "precision, or that switches"

@@ -9,6 +9,7 @@ every period of the loop; that law is fitted to the exchanged signals, by the si
 import math
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -33,6 +34,7 @@ from orchestration.theory.stability.loop_at_rest import (
     wrapping_loader,
     written_in,
 )
+from orchestration.theory.stability.periodic_schedule import periodic_schedule
 
 LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
@@ -64,7 +66,7 @@ def growth_of(system: System, instances: Instances, factor: float = 1.0, known: 
     `factor` is that of the pulse. Where one has come to rest that runs to rest is kept in `known`.
     """
     nominal = operating_point.deterministic(system)
-    period = operating_point.hyperperiod_of(nominal) or operating_point.longest_period(nominal)
+    period = repeating_period(nominal) or operating_point.longest_period(nominal)
     horizon = max(exact_nanoseconds(nominal.stop_time), FEWEST_INSTANTS * period)
     nominal = replace(nominal, stop_time=float(horizon) / NANOSECONDS)
     interval = period * max(1, math.floor(horizon / period / MOST_INSTANTS))
@@ -94,6 +96,19 @@ def growth_of(system: System, instances: Instances, factor: float = 1.0, known: 
     fitted = _rate(window, delays, rounding) if len(window) >= SHORTEST else None
     rate = _between(size, begin, min(end, count - 1)) if fitted is None else fitted
     return Growth(rate=rate / seconds, horizon=nominal.stop_time)
+
+
+def repeating_period(nominal: System) -> Fraction | None:
+    """After how long the periods of a system and the schedule of its computers and networks repeat [ns].
+
+    None: they are not known to.
+    """
+    own = operating_point.hyperperiod_of(nominal)
+    if not nominal.uses_scheduler:
+        return own
+    with suppress(UsageError):
+        return own and operating_point.hyperperiod([own, NANOSECONDS * periodic_schedule(nominal).period])
+    return None
 
 
 def _rate(window: Floats, delays: int, rounding: float) -> float | None:
