@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.theory.stability.excitation import COARSE, MAX_PULSE, Excitation, Rest, Rung
+from orchestration.theory.stability.excitation import COARSE, FINER, MAX_PULSE, Excitation, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.matrices import misfit
@@ -31,7 +31,7 @@ LONGER = 4
 """Factor on it where it does not show a slow state precisely"""
 EXACT = 1e-9
 """Error of a tangent in continuous time, relative, up to which its pulse is kept"""
-LARGER = 10.0
+LARGER = 1.0 / FINER
 """Factor on it where the error is larger"""
 FEW = 4
 """Samples over which it is seen whether a sampled component rounds coarsely"""

@@ -3,6 +3,7 @@
 from fractions import Fraction
 from itertools import count
 
+import pytest
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
@@ -13,6 +14,7 @@ from orchestration.systems.system.computers import Computer, Message, Network, T
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.periodic_schedule import ScheduleTrace, periodic_schedule
+from orchestration.theory.stability.perturbed_runs import repeating_period
 from tests.extent import tries
 from tests.orchestration.simulation.engines.random_systems import some
 
@@ -71,3 +73,20 @@ def test_a_hundred_common_periods_later_the_same_happens(system: System) -> None
     trace = ScheduleTrace(system, (turns + 12) * length)
     assert trace.schedule_between(turns * length, (turns + 1) * length, schedule.period) == schedule
     assert schedule.period % Fraction(1, 1000) == 0
+
+
+@pytest.mark.parametrize(("execution", "period"), [(0.0003, 4_000_000), (0.0019, 76_000_000), (0.0019001, None)])
+def test_twin_runs_are_compared_after_whole_periods_of_the_schedule(execution: float, period: int | None) -> None:
+    """With jobs of 1.9 ms beside a load of an eighth, 35 of them take 76 ms."""
+    tasks = {
+        "load": Task(period=0.0008, priority=1, execution=0.0001),
+        "law": Task(component="law", period=0.001, priority=2, execution=execution),
+    }
+    assert repeating_period(
+        System(
+            stop_time=1.0,
+            components={"plant": Component(fmu="plant", step=0.0005), "law": Component(fmu="law")},
+            connections=(Connection(name="of_law", start=("law.u",), end=("plant.u",)),),
+            computers={"node": Computer(scheduling="fixed-priority", preemptive=True, tasks=tasks)},
+        )
+    ) == period  # fmt: skip
