@@ -127,7 +127,7 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
         ):
             return replace(found, limit=_as_accurate(found.limit, found), lower=_as_accurate(found.lower, found))
     for value in sorted(near, key=lambda value: abs(value - end)):
-        if repeating_period(deterministic(at(value))) is None:
+        if at(value).uses_scheduler and repeating_period(deterministic(at(value))) is None:
             return LinearLimit(
                 reason=f"no local limit: at {span.text(value)} the schedule of computers and networks is not known to "
                 "repeat, so that no law of one period says whether small deviations grow: expected values at which it "
