@@ -270,6 +270,8 @@ def _program(A: Any, rest: Floats, sizes: Sequence[int], cost: Floats) -> Floats
 
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.direct_solve_method = "faer"  # of large programs in less than half of the time that the default takes
+    settings.max_threads = 1  # the same bits on any machine
     cones = [clarabel.PSDTriangleConeT(size) for size in sizes]
     nothing = sparse.csc_matrix((len(cost), len(cost)))
     return np.array(clarabel.DefaultSolver(nothing, cost, A, rest, cones, settings).solve().x)
