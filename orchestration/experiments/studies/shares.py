@@ -22,7 +22,7 @@ WITH_VALUE = "with_value"
 MEDIAN, MEAN = "median", "mean"
 """Averages of a metric, and their columns: the median over the good runs, the mean over all that have the metric"""
 INTERVALS = {MEDIAN: "of order statistics", MEAN: "by Student's t"}
-"""What their intervals at 95 % are"""
+"""Kind of their intervals at 95 %"""
 PLACE = "place"
 """Column of one value, by which runs over laws alone are one group"""
 RANDOM = "random"

@@ -76,7 +76,7 @@ class Crossing:
     frequency: float
     """Its frequency [rad/s], up to whole turns in a period: 0 of a pole at 1, half the sampling rate of one at -1."""
     accuracy: float | None = None
-    """How far the value may be wrong, as pulses of another size show; None: not known, or poles jump"""
+    """Error of the value, as pulses of another size show; None: not known, or poles jump"""
 
     @property
     def jumps(self) -> bool:
@@ -114,7 +114,7 @@ class RootLocus:
     geometric: bool = False
     """Whether values are of a geometric sequence, as over more than a decade."""
     own: float | None = None
-    """That of the file; None: it lies outside, or there is none."""
+    """Value of the file; None: it lies outside, or there is none."""
     curve: Floats = field(repr=False)
     """All values that were tried, also beside jumps, and the spectral radius at each, shape (2, k); NaN: no poles."""
     in_double: tuple[str, ...] = ()
