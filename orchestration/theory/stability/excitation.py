@@ -127,6 +127,7 @@ class Excitation:
         self._time = rest.time
         self._followed: dict[tuple[SavedState, Rung], tuple[Floats, SavedState]] = {}
         self.rest = SavedState(rest.fmu.save(), rest.time)
+        self.later = self.rest  # an unstable component that has only nearly come to rest is elsewhere by then
         self._read()
         self.at_rest = self._outputs_now.copy()
         self.weight = np.maximum(1.0, np.abs(self.at_rest))
@@ -206,26 +207,36 @@ class Excitation:
         up, down = (self.stepped(self.rest, rung, self.pulsed(i, move))[1] for move in MOVES)
         return up, down
 
-    def response(self, i: int, rungs: Sequence[Rung], *, factor: float = 1.0, lasting: bool = False) -> Floats:
+    def response(
+        self,
+        i: int,
+        rungs: Sequence[Rung],
+        *,
+        factor: float = 1.0,
+        lasting: bool = False,
+        start: SavedState | None = None,
+    ) -> Floats:
         """The response to a pulse on an input over the first rung, or all, shape (n, outputs); n ends with a large one.
 
-        The pulse is multiplied by `factor`, and the response divided by it.
+        The pulse is multiplied by `factor`, and the response divided by it. It begins at `start`; default: at rest.
         """
         courses = []
         for move in MOVES:
             pulsed = self.pulsed(i, factor * move)
             later = pulsed if lasting else self.held
             legs = [(later if k else pulsed, rung) for k, rung in enumerate(rungs)]
-            courses.append(self.course(self.rest, legs, self.largest))
+            courses.append(self.course(start or self.rest, legs, self.largest))
         return self._response(courses, factor)
 
-    def followed_response(self, i: int, rungs: Sequence[Rung], factor: float = 1.0) -> Floats:
+    def followed_response(
+        self, i: int, rungs: Sequence[Rung], *, factor: float = 1.0, start: SavedState | None = None
+    ) -> Floats:
         """As `response`, through states that are kept: the same ones are followed once."""
         if len(set(rungs)) > 1:
-            return self.response(i, rungs, factor=factor)
+            return self.response(i, rungs, factor=factor, start=start)
         courses = []
         for move in MOVES:
-            outputs, state = self.stepped(self.rest, rungs[0], self.pulsed(i, factor * move))
+            outputs, state = self.stepped(start or self.rest, rungs[0], self.pulsed(i, factor * move))
             course = [outputs]
             while len(course) < len(rungs) and self._is_followed(course[-1], self.largest):
                 outputs, state = self.followed(state, rungs[0])
@@ -346,7 +357,8 @@ class Excitation:
         return found
 
     def _two_sizes(self, i: int, rungs: Sequence[Rung], response: Callable[..., Floats]) -> tuple[Floats, Floats]:
-        once, other = (response(i, rungs, factor=factor) for factor in (1.0, OTHER_SIZE))
+        """Responses to two sizes of pulses, the second one begun `later`."""
+        once, other = response(i, rungs), response(i, rungs, factor=OTHER_SIZE, start=self.later)
         count = min(len(once), len(other))
         return once[:count], other[:count]
 

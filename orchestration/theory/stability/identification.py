@@ -146,6 +146,8 @@ def in_continuous_time(rest: Rest, period: float, step: float, *, unit: float | 
     """
     excitation = Excitation(rest)
     longest = step if unit is not None else excitation.longest_step(step, LONGEST_STEP * period)
+    for rung in _rungs(np.array([HORIZONS[0] * period]), longest, unit):
+        _, excitation.later = excitation.followed(excitation.later, rung)
     first, found, linear_until = min(FINEST * period, step), None, -1.0
     for end in (periods * period for periods in HORIZONS):
         if linear_until < 0.0 or end > HORIZONS[1] * period:  # the pulse for the second length does for the first

@@ -138,6 +138,16 @@ def test_pulses_are_enlarged_where_rounding_spoils_states_that_hardly_move_the_o
     assert np.sort(np.linalg.eigvals(found.A).real) == pytest.approx([-250.0, -falls, falls], rel=1e-5)
 
 
+def test_what_has_only_nearly_come_to_rest_and_falls_away_shows_no_further_states() -> None:
+    ball: Any = Levitated()
+    ball.kept[2] += 2e-7
+    about = Rest(fmu=ball, inputs=("u",), held=np.array([ball.VOLTAGE]), outputs=("y",), time=0.0)
+    found = in_continuous_time(about, 0.001, 0.0005)
+    after = np.exp(0.0005 * (2.0 * 9.81 / 0.01) ** 0.5 * np.array([-1.0, 1.0]))
+    after = np.sort([np.exp(-250.0 * 0.0005), *after])
+    assert np.sort(np.linalg.eigvals(found.derivatives(0.0005)[0][1:]).real) == pytest.approx(after, rel=1e-4)
+
+
 class Alternating(Line):
     """One that takes its input at every fourth step only, by a counter, and counts its steps."""
 
