@@ -28,7 +28,7 @@ EXCEPTIONS = {
     ("fmu_kit/compiler/pack/user_objects.py", "write_text"): "into the temporary folder of the objects",
     ("orchestration/command/study_table.py", "rename"): "columns of a table",
     ("orchestration/components/building/builder.py", "TemporaryFile"): "has no name, so nothing can be left",
-    ("orchestration/experiments/studies/table.py", "rename"): "columns of a table",
+    ("orchestration/experiments/studies/shares.py", "rename"): "columns of a table",
     ("orchestration/experiments/studies/table.py", "to_csv"): "a method of `Result`, not of pandas",
     ("orchestration/foundation/basics/terminal.py", "FileHandler"): "a log is appended to",
     ("orchestration/foundation/basics/terminal.py", "open"): "a stream",

@@ -312,7 +312,7 @@ class ContinuousEffects(LoopEffects):
             for j in np.flatnonzero(noisy[name].any(axis=1)):
                 raise UsageError(
                     f"white noise reaches {name}.{part.outputs[j]} directly, and has no finite variance there; "
-                    "expected --as-simulated"
+                    "expected --as-simulated of expect"
                 )
         F, R = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
         for name, part in self.continuous.items():

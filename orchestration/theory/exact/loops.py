@@ -329,7 +329,7 @@ def _white_noise(system: System, *, simulated: bool) -> dict[str, float]:
             if not simulated and system.components[component_of(end)].sampling is not None:
                 raise UsageError(
                     f"sources.{name}: white noise into {end}, which samples it: its variance has no limit; "
-                    "expected noise of a connection, or --as-simulated"
+                    "expected noise of a connection, or --as-simulated of expect"
                 )
             found[end] = float(source.noise or 0.0)
     return found

@@ -102,8 +102,7 @@ class RootLocus:
     unit: str | None
     """The unit of the quantity; None: it has none."""
     values: Floats
-    """Values of the quantity, in rising order, shape (n,); that of the file is one of them where it lies in the range.
-    """
+    """Values of the quantity, in rising order, shape (n,); the file's own is one of them where it lies in the range."""
     radius: Floats
     """The spectral radius at each, shape (n,): below 1 small deviations decay. Of a period beside others it is per
     longest period, for that of all rates differs from value to value."""

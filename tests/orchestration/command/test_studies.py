@@ -235,7 +235,8 @@ def test_limit_prints_both_figures_notes_that_they_differ_and_draws_them_on_requ
     assert found["large_signal_limit"] == "-"
     assert not {"continuous", "flies_above", "refuted_limit", "confidence"} & found.keys()
     assert (found["horizon"], found["scan"], found["tried"]) == ("50 ms", "5 ms", "6 values")
-    assert found["note"].endswith(f"beyond that nothing is known; the local limit is {found['local_limit']}")
+    known = f"beyond that nothing is known; the local limit is {found['local_limit']}"
+    assert found["note"].endswith(f"{known}; the file's own value, 10 ms, is not good either")
 
 
 @pytest.mark.parametrize(

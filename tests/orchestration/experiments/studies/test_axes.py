@@ -132,16 +132,11 @@ def test_samples_lie_in_the_range_of_their_axis(method: Method) -> None:
         assert 1e-4 * (1 - 1e-12) <= point["delay"] <= 1e-1 * (1 + 1e-12)
 
 
-def test_a_latin_hypercube_has_one_point_in_each_stratum_of_each_axis() -> None:
-    design = unit_points("latin-hypercube", 3, 50, seed=2)
-    for column in np.floor(design * 50).astype(int).T:
-        assert sorted(column) == list(range(50))
-
-
-def test_a_sobol_sequence_has_one_point_in_each_stratum_of_each_axis() -> None:
-    design = unit_points("sobol", 2, 64, seed=2)
-    for column in np.floor(design * 64).astype(int).T:
-        assert sorted(column) == list(range(64))
+@pytest.mark.parametrize(("method", "samples"), [("latin-hypercube", 50), ("sobol", 64)])
+def test_a_design_has_one_point_in_each_stratum_of_each_axis(method: Method, samples: int) -> None:
+    design = unit_points(method, 3, samples, seed=2)
+    for column in np.floor(design * samples).astype(int).T:
+        assert sorted(column) == list(range(samples))
 
 
 def test_a_morris_trajectory_moves_one_axis_at_a_time() -> None:
