@@ -47,6 +47,8 @@ SAME = 0.1
 """Difference of such errors at two sizes, relative, up to which it is the model that is wrong, and not the size"""
 SMALL = 0.01
 """Share of the largest response, below which one at the end counts as that much"""
+FAST = 3.0
+"""Growth of a response in a step, from which it is told as the reason why states are not seen"""
 LINEAR = 1e-6
 """Error allowed of what is predicted at another point of rest or from an initial state, relative to the largest"""
 
@@ -278,13 +280,27 @@ class Tangent(LinearSimulator):
             return
         self._axes, chosen, self._back = found
         if ranks[-1] == min(len(columns), len(self._axes)):
-            raise UsageError(
+            known = (
                 f"{excitation.name}: has {ranks[-1]} states or more, as {len(ranks)} pulses and {len(ladder)} steps "
-                "show no more: expected fewer, or a response that stays small and linear for longer, as with a shorter "
-                "period"
+            )
+            growth = max(map(self._growth, range(len(excitation.inputs))))
+            if growth > FAST:
+                raise UsageError(
+                    f"{known}show no more before what a pulse leaves, which grows {growth:.2g}-fold in a step, is no "
+                    "longer small and linear: expected a component that grows more slowly by itself"
+                )
+            raise UsageError(
+                f"{known}show no more: expected fewer, or a response that stays small and linear for longer, as with a "
+                "shorter period"
             )
         self._produced = [produced[k] for k in chosen]
         self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))
+
+    def _growth(self, i: int) -> float:
+        """The factor by which the response to a pulse on an input grows in a step, at most."""
+        sizes = np.abs(self._excitation.response(i, [*self.ladder, *self.ladder[-2:]])).max(axis=1)
+        sizes = sizes[sizes > 0.0]
+        return float((sizes[1:] / sizes[:-1]).max(initial=0.0))
 
     def _coordinates(self, futures: Floats, errors: Floats) -> tuple[Floats, list[int], Floats]:
         """The coordinates of what stands out of the errors: weights of the rows, columns that span, the way back."""
