@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -13,6 +14,8 @@ from orchestration.theory.certificates.family import LoopFamily
 
 LONGEST_SEQUENCE = 6
 """letters after which a sequence repeats"""
+MOST_ARRIVALS = 10
+"""messages that arrive after a run of losses"""
 SCAN = 24
 """values that are tried before the first unstable one is bisected"""
 FINE = 1e-4
@@ -88,3 +91,38 @@ def breaking_at(family: LoopFamily, value: float, longest: int = LONGEST_SEQUENC
         return None
     sequence = tuple((family.letters[i].name, point) for i, point in found[0])
     return BreakingSequence(value=value, sequence=sequence, radius=found[1])
+
+
+def breaking_losses(family: LoopFamily, run: int) -> BreakingSequence | None:
+    """The unstable sequence with `run` losses in a row that grows most by message; None if none was found.
+
+    It repeats that run, alone or with another one of as many losses at most, each before up to `MOST_ARRIVALS`.
+    """
+    letters = [[x for x in family.letters if x.name.startswith("lost") == lost] for lost in (True, False)]
+    maps, pieces = [[family.at(x) for x in each] for each in letters], len(letters[0])
+
+    @functools.cache
+    def over(piece: int, losses: int, arrivals: int) -> Floats:
+        kinds = enumerate([0] * losses + [1] * arrivals, piece)
+        return functools.reduce(lambda total, at: maps[at[1]][at[0] % pieces] @ total, kinds, np.eye(len(family.kept)))
+
+    first = [(run, arrivals) for arrivals in range(1, MOST_ARRIVALS + 1)]
+    then = itertools.product(range(1, run + 1), range(1, MOST_ARRIVALS + 1))
+    best: tuple[float, tuple[tuple[int, int], ...], int] | None = None
+    for turn in [*((x,) for x in first), *itertools.product(first, then)]:
+        length = sum(map(sum, turn))
+        same = math.gcd(length, pieces)  # pieces at which the turn does not begin anew before the sequence repeats
+        for begin in range(same):
+            at, total = begin, np.eye(len(family.kept))
+            for losses, arrivals in turn * (pieces // same):
+                total, at = over(at % pieces, losses, arrivals) @ total, at + losses + arrivals
+            radius = float(np.abs(np.linalg.eigvals(total)).max())
+            growth = radius ** (1.0 / (at - begin))
+            if radius >= 1.0 and (best is None or growth > best[0] * (1.0 + 1e-12)):
+                best = growth, turn * (pieces // same), begin
+    if best is None:
+        return None
+    growth, turns, begin = best
+    kinds = [kind for losses, arrivals in turns for kind in [0] * losses + [1] * arrivals]
+    sequence = tuple((letters[kind][at % pieces].name, ()) for at, kind in enumerate(kinds, begin))
+    return BreakingSequence(value=run, sequence=sequence, radius=growth ** len(sequence))

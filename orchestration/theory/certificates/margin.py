@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,14 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import value_at
 from orchestration.systems.system.placement import messages_by_connection, tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
-from orchestration.theory.certificates.breaking import LONGEST_SEQUENCE, BreakingSequence, breaking_at, least_breaking
+from orchestration.theory.certificates.breaking import (
+    LONGEST_SEQUENCE,
+    MOST_ARRIVALS,
+    BreakingSequence,
+    breaking_at,
+    breaking_losses,
+    least_breaking,
+)
 from orchestration.theory.certificates.causes import Cause, ScheduledLoop, cause_at
 from orchestration.theory.certificates.certified_loop import DELAY, JITTER, LOSS, CertifiedLoop, Varying, certified_loop
 from orchestration.theory.certificates.family import LoopFamily
@@ -263,22 +269,21 @@ def _of_times(timeline: LoopTimeline, varying: Varying, last: float | None, prog
 def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Share) -> Certified:
     from orchestration.theory.certificates.find_certificate import find_certificate
 
-    searched = f"sequences that repeat after at most the run and {LONGEST_SEQUENCE // 2} messages, runs up to {most}"
+    searched = f"one or two runs of up to {most} losses, 1 to {MOST_ARRIVALS} arrivals after each, repeated"
     if breaking_at(timeline.family(), 0.0) is not None:
         states = len(timeline.family().kept)
         return Certified(of=varying.path, breaking=0, largest=most, searched=searched, states=states)
     broken: BreakingSequence | None = None
-    families = list[LoopFamily]()
-    for run in range(most + 1):
+    families = [timeline.family()]
+    for run in range(1, most + 1):
         progress(0.5 * run / (most + 1))
         family = timeline.family(run=run)
-        broken = breaking_at(family, run, run + LONGEST_SEQUENCE // 2)
+        broken = breaking_losses(family, run)
         if broken is not None:
-            broken = replace(broken, value=longest_run(broken.sequence))
             break
         families.append(family)
     value, certificate, not_sought = None, None, not_sought_for(timeline.family(run=most))
-    stable = [] if not_sought else families if broken is None else families[: int(broken.value)]
+    stable = [] if not_sought else families
     step = 0
     for run, family in enumerate(stable):  # a proof for a run is one for all shorter ones, and failing takes longest
         progress(0.5 + 0.5 * run / len(stable))
@@ -291,12 +296,6 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Sh
         breaking_sequence=() if broken is None else broken.sequence, largest=most,
         searched=searched, states=len(timeline.family(run=most).kept), certificate=certificate, not_sought=not_sought,
     )  # fmt: skip
-
-
-def longest_run(sequence: Sequence[tuple[str, tuple[float, ...]]]) -> int:
-    """The most messages in a row that a repeated sequence of letters loses: it may lose fewer than it might."""
-    lost = [name.startswith("lost") for name, _ in sequence]
-    return max((len([*run]) for is_lost, run in groupby([*lost, *lost]) if is_lost), default=0)
 
 
 def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:

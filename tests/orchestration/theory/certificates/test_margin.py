@@ -12,24 +12,25 @@ import pytest
 
 from orchestration.command.cli import main
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates import margin as certificates
 from orchestration.theory.certificates import region as regions
-from orchestration.theory.certificates.breaking import breaking_at
+from orchestration.theory.certificates.breaking import breaking_at, breaking_losses
 from orchestration.theory.certificates.certified_loop import CertifiedLoop
 from orchestration.theory.certificates.check_file import check_certificate
+from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 from orchestration.theory.certificates.find_certificate import find_certificate, parts_of
 from orchestration.theory.certificates.margin import (
     Certified,
     linear_loop_of,
-    longest_run,
     margin,
     small_gain,
     varying_of,
 )
 from orchestration.theory.certificates.region import margin_region
-from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.certificates.timeline import LoopTimeline, _moves
 from orchestration.theory.certificates.verify_certificate import verified
 from orchestration.theory.stability import delay_bounds
 from orchestration.theory.stability.delay_bounds import breaking_jitter
@@ -151,12 +152,38 @@ def test_runs_of_losses_are_certified_up_to_the_one_that_breaks(system: System, 
     assert proof.runs == {"arrives": None, "lost": 1}
 
 
-def test_a_sequence_breaks_a_loop_with_the_longest_run_of_losses_that_it_has() -> None:
-    """Fewer than it might lose, and of a sequence that is repeated also from its end to its begin."""
-    given = [("lost", ()), ("arrives", ()), ("lost in part 1", ()), ("lost in part 2", ())]
-    assert longest_run([*given, ("arrives", ())]) == 2
-    assert longest_run(given) == 3
-    assert longest_run(given[1:2]) == 0
+def of_losses(run: int, *pieces: tuple[Floats, Floats]) -> LoopFamily:
+    """Messages that arrive or are lost, with a map of each, in the pieces of a period; at most `run` lost in a row."""
+    matrices, letters = dict[str, Floats](), list[Letter]()
+    for piece, maps in enumerate(pieces):
+        for name, M, moves in zip(("arrives", "lost"), maps, _moves((piece, len(pieces)), run)):
+            matrices[f"{name} {piece}"] = M
+            letters.append(Letter(name=f"{name} {piece}", moves=moves, product=(Factor(matrix=f"{name} {piece}"),)))
+    return LoopFamily(matrices=matrices, kept=tuple(range(len(pieces[0][0]))), letters=tuple(letters))
+
+
+def test_a_loss_that_breaks_a_loop_only_after_several_arrivals_is_found() -> None:
+    """A state goes around five places; where a message is lost, only what is at the first one goes on, tripled."""
+    turn = np.roll(np.eye(5), 1, axis=0)
+    family = of_losses(1, (0.9 * turn, 3.0 * turn @ np.diag([1.0, 0.0, 0.0, 0.0, 0.0])))
+    broken = breaking_losses(family, 1)
+    assert broken is not None
+    assert [name for name, _ in broken.sequence] == ["lost 0", *["arrives 0"] * 4]
+    assert (broken.value, broken.radius) == (1, pytest.approx(3.0 * 0.9**4))
+
+
+def test_losses_in_each_message_of_a_period_grow_as_in_all_short_sequences() -> None:
+    random = np.random.default_rng(3)
+    (a, b, c, d) = random.normal(size=(4, 3, 3))
+    family = of_losses(1, (a, b), (c, d))
+    found, other = breaking_losses(family, 1), breaking_at(family, 1)
+    assert found is not None
+    assert other is not None
+    word = [family.matrices[name] for name, _ in found.sequence]
+    product = functools.reduce(lambda total, M: M @ total, word, np.eye(3))
+    assert np.abs(np.linalg.eigvals(product)).max() == pytest.approx(found.radius)
+    assert [int(name[-1]) for name, _ in found.sequence] in ([0, 1] * (len(word) // 2), [1, 0] * (len(word) // 2))
+    assert found.radius ** (1 / len(word)) >= other.radius ** (1 / len(other.sequence)) * (1.0 - 1e-9)
 
 
 def test_a_small_gain_bound_beyond_what_is_certified_is_in_the_verdict() -> None:
@@ -247,7 +274,7 @@ def test_two_at_once_about_hover() -> None:
 def test_losses_about_hover() -> None:
     timeline = LoopTimeline(hover(0.04), [varying_of(native(), LOST)])
     assert find_certificate(timeline.family(run=1), [LOST]) is not None
-    broken = breaking_at(timeline.family(run=2), 2)
+    broken = breaking_losses(timeline.family(run=2), 2)
     assert broken is not None
     assert [name for name, _ in broken.sequence] == ["lost", "lost", "arrives"]
 
