@@ -1,7 +1,7 @@
 """Reads study files."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar, cast
@@ -43,8 +43,10 @@ class AxisTable:
 
 @record()
 class LabelledAxisTable(AxisTable):
-    """`[[axes]]` of a study, whose values may have labels."""
+    """`[[axes]]` of a study, whose values may have labels, or be designs: lists."""
 
+    values: list[Value | dict[str, Any] | list[Value | dict[str, Any]]] | None = None  # type: ignore[assignment]
+    """The values; a table is a distribution, a list a design: a value for each path of `sets`."""
     labels: list[str] | None = None
     """The names of its values, in their order, which tables, figures and `--at` have in place of these."""
 
@@ -176,9 +178,12 @@ def control_loop_of(file: HasBase, folder: Path, otherwise: str) -> ControlLoop:
 def _study(file: StudyFile, path: Path) -> Study:
     if file.design.design_seed < 0:
         raise UsageError(f"design.seed = {file.design.design_seed}: expected a whole number from 0")
+    for table in file.axes:
+        _expect_designs(table)
     axes = tuple(axis_of(table) for table in file.axes)
-    base, together = _with_controllers(base_of(file, path.parent), axes)
-    axes, together = _labelled(file.axes, axes, together)
+    settings = [_settings(table, axis) for table, axis in zip(file.axes, axes)]
+    base, together = _with_controllers(base_of(file, path.parent), axes, settings)
+    axes, together = _labelled(file.axes, axes, settings, together)
     study = Study(
         name=file.name or path.stem,
         base=base,
@@ -194,40 +199,74 @@ def _study(file: StudyFile, path: Path) -> Study:
     return study
 
 
-def _with_controllers(base: Request, axes: tuple[Axis, ...]) -> tuple[Request, tuple[LinkedSettings, ...]]:
+Settings: TypeAlias = Sequence[Mapping[str, Value]]
+"""The value of each path that an axis sets, for each of its values"""
+
+
+def _settings(table: LabelledAxisTable, axis: Axis) -> Settings:
+    """What the values of an axis set."""
+    if _has_designs(table):
+        return [dict(zip(axis.targets, _values(given))) for given in table.values or () if isinstance(given, list)]
+    return [dict.fromkeys(axis.targets, value) for value in axis.values or ()]
+
+
+def _expect_designs(table: LabelledAxisTable) -> None:
+    """Raise `UsageError` for lists that do not fit the paths of their axis."""
+    paths = table.sets or []
+    for given in table.values or () if _has_designs(table) else ():
+        if not isinstance(given, list) or len(given) != len(paths) or len({*paths}) < len(paths):
+            one_each = f"one for each path of sets = {shown(paths)}"
+            raise UsageError(f"axis {table.name}: values has {shown(given)}: expected lists of values, {one_each}")
+
+
+def _has_designs(table: LabelledAxisTable) -> bool:
+    return any(isinstance(value, list) for value in table.values or ())
+
+
+def _with_controllers(
+    base: Request, axes: tuple[Axis, ...], settings: Sequence[Settings]
+) -> tuple[Request, tuple[LinkedSettings, ...]]:
     """The base, and what an axis of controllers sets besides: each has the parameters of the base's vehicle for it."""
-    of_controllers = [axis for axis in axes if {*axis.targets} & CONTROLLER]
+    of_controllers = [each for each in zip(axes, settings) if {*each[0].targets} & CONTROLLER]
     if not of_controllers or not isinstance(base, ControlLoop) or base.vehicle is None:
         return base, ()
     vehicle, bare = base.vehicle, base.without_vehicle()
     sets: dict[tuple[Value, ...], dict[str, Value]] = {}
-    for controller in of_controllers[0].values or ():
-        parameters = vehicle.parameters_for(str(controller))
+    chosen, own = of_controllers[0]
+    for value, choice in zip(chosen.values or (), own):
+        parameters = vehicle.parameters_for(str(next(choice[target] for target in choice if target in CONTROLLER)))
         for axis in axes:
             for target in {*axis.targets} & parameters.keys():
                 raise UsageError(
                     f"axis {axis.name}: {target} is the vehicle's, expected no axis of it beside one of controllers"
                 )
         given = {name for name in parameters if value_at(system_of(bare), *bare.paths_of(name)) is not None}
-        sets[controller,] = {name: value for name, value in parameters.items() if name not in given}
-    return bare, (LinkedSettings(axes=(of_controllers[0].name,), sets=sets),)
+        sets[value,] = {name: value for name, value in parameters.items() if name not in given}
+    return bare, (LinkedSettings(axes=(chosen.name,), sets=sets),)
 
 
 def _labelled(
-    tables: list[LabelledAxisTable], axes: tuple[Axis, ...], together: tuple[LinkedSettings, ...]
+    tables: list[LabelledAxisTable],
+    axes: tuple[Axis, ...],
+    settings: Sequence[Settings],
+    together: tuple[LinkedSettings, ...],
 ) -> tuple[tuple[Axis, ...], tuple[LinkedSettings, ...]]:
-    """The axes with labels as their values, and what these stand for, before what was `together` already."""
+    """The axes with labels as their values, and what these stand for, before what was `together` already.
+
+    Designs without labels have the text of their values as theirs.
+    """
     named, stands_for = list(axes), []
     for i, (table, axis) in enumerate(zip(tables, axes)):
-        if table.labels is None:
+        if table.labels is None and not _has_designs(table):
             continue
-        values, names = axis.values or (), table.labels
+        values = axis.values or ()
+        names = list(map(str, values)) if table.labels is None else table.labels
         if axis.multiplies or not len({*names}) == len(names) == len(values):
             raise UsageError(
                 f"axis {axis.name}: labels = {shown(names)}: expected a different one for each value that it sets"
             )
-        sets: dict[tuple[Value, ...], dict[str, Value]] = {
-            (name,): dict.fromkeys(axis.targets, value) for name, value in zip(names, values)
+        sets: dict[tuple[Value, ...], Mapping[str, Value]] = {
+            (name,): changes for name, changes in zip(names, settings[i])
         }
         stands_for.append(LinkedSettings(axes=(axis.name,), sets=sets))
         label = dict(zip(values, names))
@@ -276,6 +315,13 @@ def axis_of(table: AxisTable) -> Axis:
     )
 
 
-def _values(listed: list[Value | dict[str, Any]]) -> tuple[Value, ...]:
-    """Listed values, distributions as the text of their table."""
-    return tuple(as_text(value) if isinstance(value, dict) else value for value in listed)
+def _values(listed: Iterable[Value | dict[str, Any] | list[Any]]) -> tuple[Value, ...]:
+    """Listed values, distributions as the text of their table, designs as that of their values."""
+    return tuple(
+        as_text(value)
+        if isinstance(value, dict)
+        else ", ".join(map(str, _values(value)))
+        if isinstance(value, list)
+        else value
+        for value in listed
+    )

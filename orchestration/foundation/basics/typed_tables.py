@@ -261,6 +261,9 @@ def _place(problem: Any, document: Any) -> list[Any]:
     return parts if problem["type"] not in _MISSING else [*parts, problem["loc"][-1]]
 
 
+_KIND = "Input should be a valid "
+
+
 def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapping[str, Any]) -> str:
     """The first error of a document of the shape `file`, in one line that states what is valid."""
     problem = _most_relevant(error)
@@ -276,5 +279,10 @@ def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapp
     if problem["type"] in _MISSING:
         return f"{place}: expected a value"
     value = problem["input"]
-    message = problem["msg"].replace("Input should be", "expected")
+    message = problem["msg"]
+    if message.startswith(_KIND):  # it may be one of several
+        here = (each["msg"] for each in error.errors() if _place(each, document) == parts)
+        kinds = list(dict.fromkeys(text.removeprefix(_KIND) for text in here if text.startswith(_KIND)))
+        message = _KIND + " or ".join([", ".join(kinds[:-1]), kinds[-1]] if kinds[1:] else kinds)
+    message = message.replace("Input should be", "expected")
     return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message[:1].lower()}{message[1:]}"

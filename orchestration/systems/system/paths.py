@@ -203,6 +203,11 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
     if not known:
         listed = f"{table}.{name}. and one of {', '.join(keys)}"
         kind = {"components": Component, "connections": Connection}.get(table)
+        if key in ("parameters", "sampling") and f"{key}." in listed:
+            raise UsageError(
+                f"{path}: is a table of several values; expected the path of one: {listed}. An axis of a study sets "
+                f'several at once: sets = ["{path}.NAME", ...], values = [[...], ...], with one value for each path'
+            )
         of_files = [] if kind is None else [_IN_FILES.get(f.name, f.name) for f in dataclasses.fields(kind)]
         if key in of_files and key != "step":  # which none has beside sampling
             raise UsageError(f"{path}: {_IN_FILE_ONLY}; expected {listed}")

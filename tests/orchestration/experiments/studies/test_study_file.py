@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -323,6 +323,27 @@ def test_noise_without_a_measurement_is_refused_as_a_target(tmp_path: Path) -> N
     assert "timing.noise: expected" in refused(tmp_path, '[[axes]]\nname = "timing.noise"\nvalues = [0.1]\n')
 
 
+DESIGNS = '[[axes]]\nname = "design"\nsets = ["seed", "stop_time"]\nvalues = '
+
+
+@pytest.mark.parametrize(
+    ("rest", "said"),
+    [
+        ("[[1, 2.0], [2]]", "axis design: values has [2]: expected lists of values, one for each path of sets = ["),
+        ("[[1, 2.0], 2]", "axis design: values has 2: expected lists of values, one for each"),
+        ("[[1, 2.0], [1, 2.0]]", "expected a different one for each value"),
+        ("[[1, [2.0]]]", "axes.0.values.0 = [1, [2.0]]: expected a valid boolean, integer, number or string"),
+        ('[[1, 2.0]]\nlabels = ["a", "b"]', "labels = ['a', 'b']: expected a different one for each value"),
+    ],
+)
+def test_a_design_has_a_value_for_each_path(tmp_path: Path, rest: str, said: str) -> None:
+    designs = load(tmp_path, f'{DESIGNS}[[1, 2.0], [3, 4.0]]\nlabels = ["a", "b"]\n')
+    systems = [designs.system(i, {}) for i in (0, 1)]
+    assert [point["design"] for point in designs.points] == ["a", "b"]
+    assert [(system.seed, system.stop_time) for system in systems] == [(1, 2.0), (3, 4.0)]
+    assert said in refused(tmp_path, f"{DESIGNS}{rest}\n")
+
+
 LAWS = '[[axes]]\nname = "law"\nsets = ["controller"]\nvalues = ["UnifiedController", "CascadedController"]\n'
 
 
@@ -336,6 +357,13 @@ def test_parameters_of_one_law_stand_in_a_vehicle_file_and_elsewhere_the_error_s
     named = load(tmp_path, f'[base]\nvehicle = "one_rate.toml"\n{LAWS}{labels}')
     assert [named.system(index, {}) for index in (0, 1)] == [study.system(index, {}) for index in (0, 1)]
     assert "labels = ['law']: expected a different one for each" in refused(tmp_path, LAWS + "labels = ['law']\n")
+    designs = 'values = [["UnifiedController", 7.0], ["CascadedController", 9.0]]'
+    both = re.sub("values = .*", designs, LAWS.replace('"controller"', '"controller", "stop_time"'))
+    pairs = load(tmp_path, f'[base]\nvehicle = "one_rate.toml"\n{both}')
+    assert [pairs.points[index]["law"] for index in (0, 1)] == ["UnifiedController, 7.0", "CascadedController, 9.0"]
+    assert [pairs.system(index, {}) for index in (0, 1)] == [
+        replace(study.system(index, {}), stop_time=7.0 + 2.0 * index) for index in (0, 1)
+    ]
     there = r"\[controllers.NAME\] of a vehicle file, vehicle = \"FILE\" under \[base\]"
     other = load(tmp_path, f"[base.controller]\nvelocity_ratio = 1\n{LAWS}")
     with pytest.raises(UsageError, match=f"controller.velocity_ratio: UnifiedController has no .*{there}"):

@@ -91,6 +91,7 @@ def test_several_changes_are_made_at_once() -> None:
         ("criterion.good", "criterion.good: is set in the file only; expected "),
         ("order", "order: is set in the file only; expected "),
         ("components.plant.interface", "components.plant.interface: is set in the file only; expected "),
+        ("components.plant.parameters", "components.plant.parameters: is a table of several values; expected "),
         ("connections.command.from", "connections.command.from: is set in the file only; expected "),
         ("components.controller.step", "components.controller.step: no such key"),
         ("components.plant.stepp", "components.plant.stepp: "),
