@@ -60,7 +60,7 @@ class ExactTuningResult(SearchResult):
 
 def search_exactly(
     tuning: ExactTuning,
-    period: float,
+    period: float | None,
     seed: int,
     progress: Callable[[float], None],
     keeping: Callable[[Costs], Costs] = lambda costs: costs,

@@ -19,9 +19,8 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.foundation.basics.simulator import Floats
 
 _TABLES = {
-    "points": "CREATE TABLE points (period REAL NOT NULL, shares TEXT NOT NULL, cost REAL NOT NULL, "
-    "checksum TEXT NOT NULL)",
-    "searches": "CREATE TABLE searches (period REAL NOT NULL, seed INTEGER NOT NULL, result TEXT NOT NULL, "
+    "points": "CREATE TABLE points (period REAL, shares TEXT NOT NULL, cost REAL NOT NULL, checksum TEXT NOT NULL)",
+    "searches": "CREATE TABLE searches (period REAL, seed INTEGER NOT NULL, result TEXT NOT NULL, "
     "checksum TEXT NOT NULL)",
 }
 Result = TypeVar("Result", bound=SearchResult)
@@ -42,7 +41,7 @@ class Record:
         """Keep the result of a search."""
         self._insert("searches", [(result.period, result.seed, json.dumps(dataclasses.asdict(result)))])
 
-    def keeping(self, period: float, costs: Costs) -> Costs:
+    def keeping(self, period: float | None, costs: Costs) -> Costs:
         """The same costs; those of points that are known for a period are not evaluated, others are kept."""
 
         def known_or_evaluated(points: Sequence[Floats]) -> list[float]:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Result = TypeVar("Result", bound=SearchResult)
-Find = Callable[[float, int, Callable[[float], None], Callable[[Costs], Costs]], Result]
+Find = Callable[[float | None, int, Callable[[float], None], Callable[[Costs], Costs]], Result]
 """Makes the result of a search from period, seed, progress function, and what keeps the costs of points"""
 
 
@@ -46,25 +46,28 @@ class Tuned:
     """The files of tuned parameters, one for each period, that scenario files and comparisons read."""
 
     @property
-    def best(self) -> dict[float, SearchResult]:
-        """By period [s], the search with the lowest cost."""
+    def best(self) -> dict[float | None, SearchResult]:
+        """By period [s], None for those of the base, the search with the lowest cost."""
         return {one.period: one for one in best_by_period(self.searches)}
 
     @property
     def verdict(self) -> str:
         """The lowest cost for each period."""
-        costs = [f"{quantity(period, 's')} cost {one.cost:.4g}, {one.judgement}" for period, one in self.best.items()]
+        costs = [
+            f"{'own periods' if period is None else quantity(period, 's')} cost {one.cost:.4g}, {one.judgement}"
+            for period, one in self.best.items()
+        ]
         return f"best of {len(self.searches)} searches: {some(costs, '; ')}"
 
     def __repr__(self) -> str:
-        best = "; ".join(f"{period:g} s: {result.judgement}" for period, result in self.best.items())
+        best = "; ".join(f"{result.place}: {result.judgement}" for result in self.best.values())
         return f"<Tuned: {len(self.searches)} searches; {best}>"
 
     def _repr_html_(self) -> str:
         """The form that notebooks show: the best search for each period."""
         rows = [
-            (f"{name} at {period:g} s", html.number(value), "")
-            for period, result in self.best.items()
+            (f"{name} at {result.place}", html.number(value), "")
+            for result in self.best.values()
             for name, value in {**result.values, "cost": result.cost, **result.figures}.items()
         ]
         return html.card("A tuning", None, None, f"{len(self.searches)} searches", rows)
@@ -158,7 +161,7 @@ def _search_by_runs(
         run = functools.partial(pool.run_all, in_lanes=execution.in_lanes)
 
         def find(
-            period: float, seed: int, report: Callable[[float], None], keeping: Callable[[Costs], Costs]
+            period: float | None, seed: int, report: Callable[[float], None], keeping: Callable[[Costs], Costs]
         ) -> TuningResult:
             return search(tuning, period, seed, run, pool.run_all, report, keeping)
 
@@ -183,7 +186,7 @@ def run_searches(
     They are kept in `folder`, with the costs of all points: of the same tuning with the same software and engine no
     search is repeated, and none that is interrupted evaluates a point again.
     """
-    searches = [(period, seed) for period in tuning.periods for seed in tuning.seeds]
+    searches = [(period, seed) for period in tuning.searched_periods for seed in tuning.seeds]
     with open_record(_place(tuning, files, folder, kind, engine)) as record:
         done = record.results(kind)
         for i, (period, seed) in enumerate(searches):
@@ -192,7 +195,7 @@ def run_searches(
             one = find(period, seed, _part(progress, i, len(searches)), functools.partial(record.keeping, period))
             record.add(one)
             done.append(one)
-            announce(f"period {period:g} s, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
+            announce(f"{one.place}, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
             if one.note:
                 announce(one.note)
     return done
@@ -201,13 +204,18 @@ def run_searches(
 def write(tuning: TuningProblem, done: Sequence[SearchResult], out: Path, command: str) -> list[Path]:
     """Write the files of tuned parameters, one for each period; their paths."""
     texts = {
-        f"{tuning.name}_{1000.0 * best.period:g}ms.toml": gains_text(tuning, best, done, command)
+        f"{tuning.name}_{_named_by(best.period)}.toml": gains_text(tuning, best, done, command)
         for best in best_by_period(done)
     }
     with new_files(out) as new:
         for name, text in texts.items():
             write_atomically(new / name, text)
     return [out / name for name in texts]
+
+
+def _named_by(period: float | None) -> str:
+    """The end of the name of a file of tuned parameters, never none: it might be the tuning file itself."""
+    return "own_periods" if period is None else f"{1000.0 * period:g}ms"
 
 
 def _part(progress: Callable[[float], None], index: int, count: int) -> Callable[[float], None]:

@@ -51,9 +51,9 @@ class Tuning(TuningProblem):
     def first_run(self) -> tuple[System, Files]:
         """The system of one of the runs, and the files of all."""
         middle = self.values([0.5] * len(self.parameters))
-        return self.systems(self.periods[0], middle, replace(self.starts, count=1))[0], self.files()
+        return self.systems(self.searched_periods[0], middle, replace(self.starts, count=1))[0], self.files()
 
-    def systems(self, period: float, values: Mapping[str, float], starts: Starts) -> list[System]:
+    def systems(self, period: float | None, values: Mapping[str, float], starts: Starts) -> list[System]:
         """The systems from an ensemble of initial conditions, each with its own seed, as in a comparison.
 
         Raises `UsageError` for an invalid value.
@@ -130,7 +130,7 @@ class TuningResult(SearchResult):
 
 def search(
     tuning: Tuning,
-    period: float,
+    period: float | None,
     seed: int,
     run: RunSystems,
     judge: RunSystems,
@@ -157,7 +157,7 @@ def search(
     )
 
 
-def _costs(tuning: Tuning, period: float, candidates: Sequence[Floats], run: RunSystems) -> list[float]:
+def _costs(tuning: Tuning, period: float | None, candidates: Sequence[Floats], run: RunSystems) -> list[float]:
     """The mean cost of each candidate; all runs of all candidates are submitted together."""
     systems = [
         system

@@ -112,8 +112,9 @@ def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[
     system, known = tuning.system(best.period, best.values), versions()
     faults = [f"{x.name} {text}" for x in system.connections if (text := describe_faults(x))] or ["no faults"]
     software = f"quadcosim {known['quadcosim']}, sources {known['sources'][:16]}, numpy {known['numpy']}"
+    periods = "the periods of the file" if best.period is None else f"a period of {best.period:g} s"
     lines = [
-        f"Tuned for a period of {best.period:g} s by: {command}",
+        f"Tuned for {periods} by: {command}",
         f"{best.evaluations} evaluations of {of}",
         *more,
         f"The loop is {'; '.join([describe_clock(system), *faults])}. By {software}.",

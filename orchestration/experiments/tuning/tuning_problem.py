@@ -37,12 +37,13 @@ class TuningProblem:
     """The parameters to tune, each between its `low` and its `high`."""
     cost: str
     """The cost to minimise: an expression over the objectives of the base."""
-    periods: tuple[float, ...]
-    """The sampling periods [s], for each of which it is tuned separately."""
     evaluations: int
     """The number of evaluations of the cost in a search, per parameter; rounded up to whole generations of points."""
     seeds: tuple[int, ...]
     """The seeds of the optimiser, each for a separate search; the search with the lowest cost is taken."""
+    periods: tuple[float, ...] | None = None
+    """The sampling periods [s] of the only sampled component, for each of which it is tuned separately; default: all
+    that is sampled keeps its own period."""
 
     def __post_init__(self) -> None:
         if not self.parameters:
@@ -50,12 +51,13 @@ class TuningProblem:
         if self.evaluations < 1:
             raise UsageError(f"evaluations = {self.evaluations}: expected at least 1")
         for name in ("periods", "seeds"):
-            if not getattr(self, name):
+            if getattr(self, name) == ():
                 raise UsageError(f"{name}: expected at least one")
         if COST in self.origin.objectives:
             raise UsageError(f"objectives.{COST}: expected another name, which a tuning adds")
         assert self._paths
-        assert self._period_paths
+        if self.periods is not None:
+            assert self._period_paths
 
     @cached_property
     def origin(self) -> System:
@@ -71,7 +73,15 @@ class TuningProblem:
         try:
             return Varied(request=self.base, of=default_quantity(self.base)).paths
         except UsageError:
-            raise UsageError("search.periods: expected a base with one period, of its only sampled component") from None
+            raise UsageError(
+                "search.periods: expected a base with one period, of its only sampled component; leave out "
+                "search.periods to keep the periods of the file"
+            ) from None
+
+    @property
+    def searched_periods(self) -> tuple[float | None, ...]:
+        """The periods [s] of searches; None: those of the base."""
+        return (None,) if self.periods is None else self.periods
 
     def describe_cost(self) -> list[str]:
         """The definition of the cost, line by line, for the file of tuned parameters."""
@@ -90,7 +100,7 @@ class TuningProblem:
     @property
     def effort(self) -> str:
         """The number of searches and their evaluations, in words."""
-        asked, searches = self.evaluations * len(self.parameters), len(self.periods) * len(self.seeds)
+        asked, searches = self.evaluations * len(self.parameters), len(self.searched_periods) * len(self.seeds)
         text = f"{searches} search{'es' if searches > 1 else ''} of {self.budget} evaluations of the cost each"
         if asked == self.budget:
             return text
@@ -112,11 +122,13 @@ class TuningProblem:
         """The parameters there by name, in words."""
         return ", ".join(f"{axis.name} = {axis.at(float(share)):.4g}" for axis, share in zip(self.parameters, shares))
 
-    def system(self, period: float, values: Mapping[str, float]) -> System:
+    def system(self, period: float | None, values: Mapping[str, float]) -> System:
         """The system with a period and values of the targets; raises `UsageError` for an invalid value."""
         changes = {path: value for target, value in values.items() for path in self._paths[target]}
+        if period is not None:
+            changes |= dict.fromkeys(self._period_paths, period)
         with errors_in_own_terms(self.base):
-            system = changed(self.origin, {**changes, **dict.fromkeys(self._period_paths, period)})
+            system = changed(self.origin, changes)
             return replace(system, objectives={**system.objectives, COST: self.cost})
 
 
@@ -124,8 +136,8 @@ class TuningProblem:
 class SearchResult:
     """The result of one search."""
 
-    period: float
-    """Period [s]"""
+    period: float | None
+    """Period [s]; None: those of the base"""
     seed: int
     values: dict[str, float]
     """Values of each target"""
@@ -134,6 +146,11 @@ class SearchResult:
     evaluations: int
     note: str = ""
     """Failures of candidates on the way, in one line; empty: none"""
+
+    @property
+    def place(self) -> str:
+        """The period, in words."""
+        return "own periods" if self.period is None else f"period {self.period:g} s"
 
     @property
     def judgement(self) -> str:

@@ -17,6 +17,7 @@ from orchestration.experiments.tuning.tuning_file import load_tuning
 from orchestration.experiments.tuning.tuning_problem import COST
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.model import System
 from orchestration.theory.exact.expect import Expected
 from orchestration.theory.exact.loops import Loops
@@ -143,8 +144,27 @@ def test_engine_and_workers_are_refused_where_there_are_no_runs(tmp_path: Path) 
         tune(tuning(), out=tmp_path, engine="batch")
 
 
-def test_periods_are_refused_where_several_components_sample() -> None:
-    base = load_tuning(FILE).origin
-    twice = replace(base, components={**base.components, "other": base.components["controller"]})
-    with pytest.raises(UsageError, match=r"search\.periods: expected a base with one period"):
+def test_several_sampled_components_are_tuned_at_their_own_periods_and_no_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base, seen = fmus.native_twins(load_tuning(FILE).origin), set[tuple[float, ...]]()
+    controller = base.components["controller"]
+    twice = replace(base, components={**base.components, "other": replace(controller, sampling=Sampling(period=0.03))})
+    with pytest.raises(UsageError, match=r"search\.periods: expected a .*; leave out search\.periods to keep the p"):
         tuning(base=twice)
+
+    def known(system: System, loops: Loops) -> Expected:
+        periods = (one.sampling.period for one in system.components.values() if isinstance(one.sampling, Sampling))
+        seen.add(tuple(periods))
+        return replace(EXPECTED, objectives={COST: float(system.components["controller"].parameters["K"])})
+
+    monkeypatch.setattr(exact, "expected_of", known)
+    own = tuning(base=twice, periods=None, evaluations=3)
+    found = tuned(own, tmp_path)
+    assert seen == {(0.006, 0.03)}
+    assert found.written == (tmp_path / "gains" / "servo_gains_own_periods.toml",)
+    text = found.written[0].read_text()
+    assert text.startswith("# Tuned for the periods of the file by: quadcosim.tune\n")
+    assert "The loop is sampled controller every 6 ms, other every 30 ms;" in text
+    assert found.verdict.startswith("best of 1 searches: own periods cost ")
+    assert tuned(own, tmp_path).searches == found.searches

@@ -113,6 +113,8 @@ def test_every_start_has_its_own_seed_as_in_a_comparison(tuning):
 def test_runs_have_the_period_that_is_tuned_for(tuning):
     systems = tuning.systems(0.02, tuning.values([0.5, 0.5]), tuning.starts)
     assert {system.components["controller"].sampling.period for system in systems} == {0.02}
+    own, _ = replace(tuning, periods=None).first_run()
+    assert own.components["controller"].sampling == tuning.origin.components["controller"].sampling
 
 
 def test_the_best_search_is_the_one_of_lowest_cost(tuning):
