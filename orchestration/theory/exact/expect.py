@@ -28,7 +28,7 @@ class Expected:
     """The expectation of each objective that consists of `mean(…)` and `rms(…)` of polynomials of degree two in
     signals, by name; None: there is none. `rms(x)` is the root of the expected mean of x²."""
     reasons: Mapping[str, str]
-    """The reasons why there is none, by name."""
+    """The reasons why there is none, by name; also of the fourth-moment radius."""
     mean_square_radius: float
     """The growth factor of second moments over a hyperperiod; from 1 on no mean of squares is finite, whatever a
     run prints."""
@@ -96,10 +96,13 @@ def expected_of(system: System, loops: Loops, horizon: float | None = None) -> E
         reasons = {**linear.objectives.reasons, **dict.fromkeys(linear.objectives.calls, why)}
     else:
         values, reasons = _finite_values(linear.objectives, means), linear.objectives.reasons
+    reasons = {name: reasons[name] for name in system.objectives if name in reasons}
+    if loop.fourth_moment_radius is None:
+        reasons["fourth_moment_radius"] = "too many fourth moments to compute"
     remembered = 1.0 / (1.0 - loop.radius) if loop.radius < 1.0 else 1.0
     of_components = max(linear.accuracy, linear.precision * remembered)
     return Expected(
-        objectives=values, reasons={name: reasons[name] for name in system.objectives if name in reasons},
+        objectives=values, reasons=reasons,
         mean_square_radius=loop.radius, fourth_moment_radius=loop.fourth_moment_radius,
         accuracy=converged.difference + of_components, period=solution.loop.period,
         method=_method(linear.methods, converged.order, system, simulated=loops.simulated, horizon=horizon),

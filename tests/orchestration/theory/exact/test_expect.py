@@ -18,7 +18,7 @@ from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import Source
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion, System
-from orchestration.theory.exact import mean_square
+from orchestration.theory.exact import mean_square, moments
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
 from orchestration.theory.exact.timing import sampled_tasks
@@ -117,6 +117,15 @@ def test_the_command_prints_what_it_found(main: Main) -> None:
     assert lines.startswith("variance = 5.887, effort = ")
     assert "variance              5.8867513459" in lines
     assert "confidence intervals of mean squares over runs are meaningless here" in lines
+
+
+def test_a_loop_with_too_many_fourth_moments_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(moments, "MAX_FOURTH_PRODUCTS", 0.0)
+    system = example("minimum_variance", {"connections.command.loss": 0.2})
+    found = expected_of(system, Loops(files_of(system).models))
+    assert (found.fourth_moment_radius, found.reasons) == (
+        None, {"fourth_moment_radius": "too many fourth moments to compute"},
+    )  # fmt: skip
 
 
 def as_simulated(**changes: Any) -> float:
