@@ -12,10 +12,11 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import LogFormatter, MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import in_brackets
 from orchestration.simulation.figures.lines import label_time
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
-from orchestration.simulation.results.display_names import signal
+from orchestration.simulation.results.display_names import signal, unit
 from orchestration.simulation.results.quantities import Quantity, setting
 from orchestration.theory.stability.frequency import Bode, LoopMargins, critical_phase
 from orchestration.theory.stability.root_locus import RootLocus
@@ -137,13 +138,15 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
     """What the law takes back of a step that is added to each command, sample by sample."""
     figure = style.figure(38.0)
     axes = figure.add_subplot()
+    units = {unit(loop.unit) for loop in result.loops}
+    shared = units.pop() if len(units) == 1 else None
     for i, (response, loop) in enumerate(zip(result.responses, result.loops, strict=True)):
         axes.step(
             result.times, response, where="post", color=CYCLE[i % len(CYCLE)], linestyle=DASHES[i % len(DASHES)],
-            label=signal(loop.output, {}),
+            label=in_brackets(signal(loop.output, {}), None if shared else unit(loop.unit)),
         )  # fmt: skip
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
-    axes.set(ylabel="taken back of a step of 1", xlim=(0.0, result.times[-1]))
+    axes.set(ylabel=in_brackets("taken back of a step of 1", shared), xlim=(0.0, result.times[-1]))
     label_time(axes)
     figure.legend(loc="outside lower center", ncols=2)
     return figure

@@ -10,7 +10,10 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.unit_algebra import quantity
-from orchestration.simulation.requests.request import RequestLike
+from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.results.units import column_infos
+from orchestration.systems.system.files import files_of
+from orchestration.systems.system.request import system_of
 from orchestration.theory.stability.frequency import expect_decided, receivers_of
 from orchestration.theory.stability.in_double import of_code
 from orchestration.theory.stability.linearise import Linearised, clock_of, linearise
@@ -38,6 +41,8 @@ class LoopStep:
     """The inputs that the command goes to, as COMPONENT.VARIABLE."""
     output: str
     """The command, as COMPONENT.VARIABLE."""
+    unit: str | None
+    """Its unit, as its FMU declares it."""
     rise_time: float | None
     """The time from 10 to 90 % of the final value [s]; None: the final value is 0."""
     overshoot: float | None
@@ -144,7 +149,7 @@ def _responses(whole: ClosedLoop, each: Floats, radius: float) -> Floats:
 
 
 def _figures(loop: Linearised, request: RequestLike, i: int, times: Floats, response: Floats, final: float) -> LoopStep:
-    output = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}"
+    output, system = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}", system_of(request_of(request))
     largest = float(np.abs(response).max(initial=0.0))
     has_value = abs(final) > NO_VALUE * max(largest, 1.0)
     share = response / final if has_value else response
@@ -153,6 +158,7 @@ def _figures(loop: Linearised, request: RequestLike, i: int, times: Floats, resp
     return LoopStep(
         input=receivers_of(request, output),
         output=output,
+        unit=column_infos(system, files_of(system).models_of(system), [output])[output].unit,
         rise_time=float(times[high] - times[low]) if has_value else None,
         overshoot=max(0.0, 100.0 * (float(share.max()) - 1.0)) if has_value else None,
         settling_time=float(times[min(outside[-1] + 1, len(times) - 1)]) if len(outside) else 0.0,

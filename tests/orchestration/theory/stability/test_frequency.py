@@ -328,6 +328,8 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     assert all(one.verdict.endswith("tions, float code of a, b in double precision)") for one in of_floats)
     for name in ("bode", "step"):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    (axes,) = step_of("dc_servo").plot()["step"].axes
+    assert axes.get_ylabel() == "taken back of a step of 1 [V]"
     gain, phase, sensitivity = bode_of("dc_servo").plot()["bode"].axes
     (loop,) = bode_of("dc_servo").loops
     dot = [[loop.crossover], [0.0]]  # where the gain is 1
