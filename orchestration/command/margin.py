@@ -232,9 +232,11 @@ def _matrices(system: "StateSpace") -> dict[str, object]:
 
 
 def _summary(system: "StateSpace", samples: int) -> str:
+    from orchestration.theory.stability.linearise import states_text
+
     inputs, outputs = (
         ", ".join(name.removesuffix("[0]") if samples > 1 else name for name in names[: len(names) // samples])
         for names in (system.inputs, system.outputs)
     )
     each = "" if samples == 1 else f", each at {samples} samples"
-    return f"{inputs} → {outputs}{each}; {len(system.A)} states, every {time_text(system.dt)}"
+    return f"{inputs} → {outputs}{each}; {states_text(len(system.A))}, every {time_text(system.dt)}"

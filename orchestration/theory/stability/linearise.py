@@ -72,7 +72,8 @@ class Linearised:
     @property
     def verdict(self) -> str:
         """Whether the linear loop is stable, and its sizes."""
-        sizes = f"{self.name} with {_count_of(len(self.component.A))}, the rest with {_count_of(len(self.rest.A))}"
+        sizes = f"{self.name} with {states_text(len(self.component.A))}, the rest with {states_text(len(self.rest.A))}"
+        sizes += ", those that inputs reach and outputs show"
         return f"{stability_of(self.radius)}, {self.clock}: {sizes}{of_code(self.in_double)}"
 
     @property
@@ -193,5 +194,6 @@ def stability_of(radius: float) -> str:
     return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {shown}"
 
 
-def _count_of(count: int) -> str:
+def states_text(count: int) -> str:
+    """So many states, in words."""
     return f"{count} state{'' if count == 1 else 's'}"

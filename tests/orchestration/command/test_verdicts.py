@@ -83,7 +83,10 @@ def test_a_radius_that_rounding_may_put_on_either_side_of_one_decides_nothing() 
         loop = SimpleNamespace(name="law", component=half, rest=half, radius=radius, **common)
         return str(cast("Any", Linearised.verdict).fget(loop))
 
-    assert sentence(0.9).startswith("stable: spectral radius 0.9, sampled every 10 ms: law with 1 state,")
+    assert sentence(0.9) == (
+        "stable: spectral radius 0.9, sampled every 10 ms: law with 1 state, the rest with 1 state, those that inputs "
+        "reach and outputs show"
+    )
     assert sentence(1.1).startswith("unstable: spectral radius 1.1")
     assert sentence(1.0 - 1e-9).startswith("not decidably stable: ")
 
