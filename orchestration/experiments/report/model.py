@@ -232,7 +232,7 @@ class OtherStudy:
 
     name: str
     table: ReportTable
-    """Its runs, if both repeat with their metrics"""
+    """Its runs with their metrics"""
     shares: tuple[Shares, ...]
 
 
@@ -258,6 +258,8 @@ class Report:
     overall: ReportShare | None = None
     shares: tuple[Shares, ...] = ()
     compared: ComparisonCells | None = None
+    repeat: str | None = None
+    """the axis that repeats the combinations of the others"""
     repeated: RepeatedMaps | None = None
     other: OtherStudy | None = None
     contents: tuple[str, ...] = ()

@@ -102,7 +102,7 @@ def study_report(
         repeated = repeated_maps(runs)
     else:
         repeated = maps_of_both((name, runs), (other[0], runs_in_cells(other[2], other[1].rows, axes)))
-        over = _over(*other, axes=axes, of=name, blobs=blobs, metrics=() if repeated is None else stored.metrics)
+        over = _over(*other, axes=axes, of=name, blobs=blobs, metrics=stored.metrics)
     return Report(
         kind="study",
         title=name,
@@ -125,6 +125,7 @@ def study_report(
             for axis in axes
             if repeated is None and (along := _along(axis, stored, study)) is not None
         ),
+        repeat=None if study is None else study.repeat,
         repeated=repeated,
         other=None if other is None else over,
         contents=tuple(embedded.contents),

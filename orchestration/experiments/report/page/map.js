@@ -12,7 +12,7 @@ const map = { x: null, y: null, metric: null, fixed: {}, row: null, rows: [], is
 function startMap() {
   byId("map").hidden = false;
   map.metric = columnsByName.get(report.metric) ?? drawable[0];
-  const varied = axes.filter((axis) => valuesOf(axis).length > 1);
+  const varied = axes.filter((axis) => axis.name !== report.repeat && valuesOf(axis).length > 1);
   map.x = varied[0] ?? axes[0];
   map.y = varied[1] ?? VALUE;
   for (const axis of axes) map.fixed[axis.name] = valuesOf(axis)[0];
@@ -40,14 +40,11 @@ function buildMapControls() {
     choice("across", axes.map((axis) => [axis.name, axis.label]), map.x.name, (name) => changeMap({ x: columnsByName.get(name) })),
     choice("up", [...axes.map((axis) => [axis.name, axis.label]), [VALUE, "the metric"]], map.y === VALUE ? VALUE : map.y.name, (name) => changeMap({ y: name === VALUE ? VALUE : columnsByName.get(name) })),
   );
-  if (report.table.is_grid) {
-    for (const axis of axes) {
-      if (axis === map.x || axis === map.y || valuesOf(axis).length < 2) continue;
-      controls.append(choice(titled(axis.label, axis.unit), valuesOf(axis).map((value, i) => [i, shown(value)]), valuesOf(axis).indexOf(map.fixed[axis.name]), (i) => {
-        map.fixed[axis.name] = valuesOf(axis)[i];
-        drawMap();
-      }));
-    }
+  for (const axis of fixedAxes()) {
+    controls.append(choice(titled(axis.label, axis.unit), valuesOf(axis).map((value, i) => [i, shown(value)]), valuesOf(axis).indexOf(map.fixed[axis.name]), (i) => {
+      map.fixed[axis.name] = valuesOf(axis)[i];
+      drawMap();
+    }));
   }
 }
 
@@ -59,9 +56,14 @@ function changeMap(change) {
   drawMap();
 }
 
-/** Rows of the slice that is shown: all of a sample. */
+/** The axes with one value in the slice that is shown: none of a sample. Over one axis all that repeats is shown. */
+function fixedAxes() {
+  const isFixed = (axis) => axis !== map.x && axis !== map.y && !(map.y === VALUE && axis.name === report.repeat);
+  return report.table.is_grid ? axes.filter((axis) => isFixed(axis) && valuesOf(axis).length > 1) : [];
+}
+
 function rowsOfSlice() {
-  const others = report.table.is_grid ? axes.filter((axis) => axis !== map.x && axis !== map.y && valuesOf(axis).length > 1) : [];
+  const others = fixedAxes();
   const found = [];
   for (let row = 0; row < report.table.count; row += 1) {
     if (others.every((axis) => cellOf(axis, row) === map.fixed[axis.name])) found.push(row);
@@ -75,7 +77,9 @@ function drawMap() {
   map.shades = shadesOf(map.rows.filter((row) => kindOf(outcomeOf(row)) === "good").map((row) => cellOf(map.metric, row)));
   map.inside = rowsInBox();
   measureSlider();
-  const traces = map.isGrid ? gridTraces() : pointTraces();
+  const isOver = report.other && map.y === VALUE;
+  const inSlice = (at) => fixedAxes().every((axis) => at(axis.name) === map.fixed[axis.name]);
+  const traces = map.isGrid ? gridTraces() : isOver ? tracesOfBoth(inSlice, map.x.name !== report.repeat) : pointTraces();
   const holder = byId("map-plot");
   holder.onbox = choseBox;
   holder.onwhole = () => choseBox(null, null);
@@ -229,7 +233,7 @@ function gridTraces() {
 function edgeOfOther(across, up) {
   if (!report.other) return [];
   const own = new Map(report.other.table.columns.map((column) => [column.name, column]));
-  const others = axes.filter((axis) => axis !== map.x && axis !== map.y && valuesOf(axis).length > 1);
+  const others = fixedAxes();
   const kinds = up.map(() => new Array(across.length).fill(null));
   for (let row = 0; row < report.other.table.count; row += 1) {
     if (!others.every((axis) => cellOf(own.get(axis.name), row) === map.fixed[axis.name])) continue;
@@ -320,6 +324,40 @@ function pointTraces(foot = footOf(heights()), all = map.rows, of = "", [marks, 
       },
     };
   });
+}
+
+/** The runs that are shown, and those wanted of a second study with marks of their own; each with its mean if asked. */
+function tracesOfBoth(isWanted, hasMeans) {
+  const columns = new Map(report.other.table.columns.map((column) => [column.name, column]));
+  const at = (name, row) => (columns.has(name) ? cellOf(columns.get(name), row) : NaN);
+  const valueOf = (row) => at(map.metric.name, row);
+  const rows = [...Array(report.other.table.count).keys()].filter((row) => isWanted((name) => at(name, row)));
+  const foot = footOf([...heights(), ...rows.map(valueOf).filter(Number.isFinite)]);
+  const own = pointTraces(foot, map.rows, `${report.title}: `);
+  const beside = Object.entries(MARKS_OF_OTHER).flatMap(([kind, symbol]) => {
+    const those = rows.filter((row) => kindOf(at("outcome", row)) === kind);
+    if (!those.length) return [];
+    const values = those.map(valueOf);
+    return {
+      type: "scatter", mode: "markers", name: `${escaped(report.other.name)}: ${nameOfMarks(kind, values)}`,
+      x: those.map((row) => at(map.x.name, row)), y: values.map((value) => (Number.isNaN(value) ? foot : value)),
+      said: (i) => `<b>${escaped(report.other.name)}, run ${at("design_index", those[i])}: ${escaped(at("outcome", those[i]))}</b><br>${escaped(map.metric.label)}: ${withUnit(values[i], escaped(map.metric.unit ?? ""))}`,
+      marker: { symbol, size: 9, color: COLORS[2], line: { width: 1.5, color: COLORS[2] } },
+    };
+  });
+  const means = hasMeans && report.table.is_grid && !map.x.words ? [
+    meanTrace(report.title, map.rows.map((row) => placeOnMap(row)), 0), meanTrace(report.other.name, rows.map((row) => [at(map.x.name, row), valueOf(row)]), 2),
+  ] : [];
+  return [...own, ...beside, ...means];
+}
+
+/** The mean of the values that there are at each place across. */
+function meanTrace(of, points, color) {
+  const known = points.filter(([, value]) => Number.isFinite(value));
+  const across = [...new Set(known.map(([x]) => x))].sort((a, b) => a - b);
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+  const y = across.map((x) => mean(known.filter((point) => point[0] === x).map((point) => point[1])));
+  return { type: "scatter", mode: "lines", name: `${escaped(of)}: mean`, x: across, y, line: { color: COLORS[color], width: 1.5, dash: color ? "dash" : undefined } };
 }
 
 // -- what is chosen ---------------------------------------------------------------------------------------

@@ -119,25 +119,8 @@ function tracesOfCell() {
     return different(law).flatMap((name, i) => pointTraces(footOf(heights()), map.rows.filter((row) => cellOf(law, row) === name), `${name.split("/").at(-1)}: `, i ? [MARKS_OF_OTHER, COLORS[2]] : undefined));
   }
   if (!others?.length) return pointTraces();
-  const columns = new Map(report.other.table.columns.map((column) => [column.name, column]));
-  const at = (name, row) => (columns.has(name) ? cellOf(columns.get(name), row) : NaN);
-  const valueOf = (row) => at(map.metric.name, row);
   const wanted = new Set(others);
-  const rows = [...Array(report.other.table.count).keys()].filter((row) => wanted.has(at("design_index", row)));
-  const foot = footOf([...heights(), ...rows.map(valueOf).filter(Number.isFinite)]);
-  const own = pointTraces(foot, map.rows, `${report.title}: `);
-  const beside = Object.entries(MARKS_OF_OTHER).flatMap(([kind, symbol]) => {
-    const those = rows.filter((row) => kindOf(at("outcome", row)) === kind);
-    if (!those.length) return [];
-    const values = those.map(valueOf);
-    return {
-      type: "scatter", mode: "markers", name: `${escaped(report.other.name)}: ${nameOfMarks(kind, values)}`,
-      x: those.map((row) => at(map.x.name, row)), y: values.map((value) => (Number.isNaN(value) ? foot : value)),
-      said: (i) => `<b>${escaped(report.other.name)}, run ${at("design_index", those[i])}: ${escaped(at("outcome", those[i]))}</b><br>${escaped(map.metric.label)}: ${withUnit(values[i], escaped(map.metric.unit ?? ""))}`,
-      marker: { symbol, size: 9, color: COLORS[2], line: { width: 1.5, color: COLORS[2] } },
-    };
-  });
-  return [...own, ...beside];
+  return tracesOfBoth((at) => wanted.has(at("design_index")), false);
 }
 
 /** The row of the table of a run by its index in the design. */

@@ -341,6 +341,24 @@ def test_a_second_study_is_drawn_over_the_first(of_study: Any, show: Show) -> No
     page.close()
 
 
+def test_of_two_studies_over_one_axis_the_metric_of_all_seeds_is_drawn_with_the_means(
+    show: Show, tmp_path: Path
+) -> None:
+    axes = [{"name": "timing.loss", "values": [0.0, 0.3]}, {"name": "seed", "values": [1, 2, 3]}]
+    swept = []
+    for name, height in (("low", 1.0), ("high", 2.0)):
+        base = {"stop_time": 0.02, "timing": {"plant_interval": 0.005}, "plant": {"initial.position.z": height}}
+        tables = {"name": name, "base": base, "axes": axes, "design": {"repeat": "seed"}}
+        swept.append(sweep(load_study(tables), out=tmp_path / name))
+    page = show(report(*swept, out=tmp_path / "both.html", flights=0))
+    drawn = page.evaluate("document.getElementById('map-plot').data.map(({ name, x, y }) => [name, x, y])")
+    page.close()
+    heights = {name: (x, y) for name, x, y in drawn}
+    for name, outcome in (("low", "bounded"), ("high", "settled")):
+        across, up = heights[f"{name}: {outcome} (6)"]
+        assert heights[f"{name}: mean"] == ([across[0], across[-1]], pytest.approx([sum(up[:3]) / 3, sum(up[3:]) / 3]))
+
+
 def test_an_axis_of_words_has_a_tick_for_each_and_its_cells_fill_the_map(show: Show, tmp_path: Path) -> None:
     file = tmp_path / "orders.toml"
     file.write_text(
