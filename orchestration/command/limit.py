@@ -31,14 +31,16 @@ def limit(
         float | None,
         option(
             "--tolerance",
-            "Width of the last bracket; default of a PATH: a fiftieth of --scan (of a period: a twentieth of it).",
+            "Width of the last bracket; default of a PATH: a fiftieth of --scan (of a period: a twentieth of it; "
+            "over decades: 1 % of the value).",
         ),
     ] = None,
     scan: Annotated[
         float | None,
         option(
             "--scan",
-            "Step of the scan; default of a PATH: a twentieth of the range (of a period: half of it).",
+            "Step of the scan; default of a PATH: a twentieth of the range (of a period: half of it; over "
+            "decades: equal factors, of at most 1.6).",
             "STEP",
         ),
     ] = None,

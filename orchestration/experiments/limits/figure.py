@@ -1,6 +1,7 @@
 """The figure of a limit: the measurement at each value, the measured limit, and the limit by theory."""
 
 import contextlib
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from orchestration.experiments.studies import figures
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.unit_algebra import time_text
+from orchestration.simulation.figures.lines import plain
 from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -38,7 +40,13 @@ def limit_figure(result: Limit, style: Style = SCREEN) -> Figure:
         _draw_values(axes, result, across)
     else:
         _draw_shares(axes, result, across)
-    axes.set_xlim(_with_margin([one.value * across.factor for one in result.tried]))
+    tried = [one.value * across.factor for one in result.tried]
+    if result.geometric and tried[0] > 0.0:
+        axes.set_xscale("log")
+        axes.set_xlim(*np.exp(_with_margin([math.log(value) for value in tried])))
+        plain(axes.xaxis)
+    else:
+        axes.set_xlim(_with_margin(tried))
     _draw_limits(axes, result, across)
     axes.set_xlabel(across.title)
     if style.has_titles:

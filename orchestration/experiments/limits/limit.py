@@ -58,11 +58,11 @@ def limit(
 
     `of` is a path, or for the quadrotor `period`, `delay`, `jitter` or `loss`; default: the period of the only sampled
     component. The search lies between `first` and `last`: from the own value of the request up and down, or else from
-    `first` up, in steps of `scan`. `continuous` adds a run near continuous time
-    (quadrotor only). The seeds of a random quantity are run by `workers` processes. The engine `auto` uses native twins
-    of the FMUs if available. `progress` is called with the share done of a search in which nothing fails before the end
-    of the scan, `announce` with the choice of the engine and a line for each evaluated value, by default beside the
-    bar; None for silence.
+    `first` up, in steps of `scan`, or over decades, without it and `tolerance`, by equal factors. `continuous` adds a
+    run near continuous time (quadrotor only). The seeds of a random quantity are run by `workers` processes. The engine
+    `auto` uses native twins of the FMUs if available. `progress` is called with the share done of a search in which
+    nothing fails before the end of the scan, `announce` with the choice of the engine and a line for each evaluated
+    value, by default beside the bar; None for silence.
 
     Raises `UsageError` for an invalid quantity, range, tolerance, step or confidence.
     """
@@ -93,6 +93,7 @@ def limit(
             values,
             span.own,
             span.tolerance,
+            geometric=span.geometric,
             parts=PARTS_OF_STEP,
             remaining=lambda most: trials.expect_remaining(most + BEYOND),
         )
@@ -127,7 +128,7 @@ def limit(
         refuted_limit=refuted, missed_deadlines_from=missed_from,
         missed_by=() if missed_from is None else tuple(schedule(varied.at(missed_from)).missed),
         follows=checks[0].follows, horizon=varied.system.stop_time, tolerance=span.tolerance,
-        scan=span.step, confidence=confidence if random else None, seeds=seeds,
+        scan=span.step, geometric=span.geometric, confidence=confidence if random else None, seeds=seeds,
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
         ),
@@ -137,8 +138,10 @@ def limit(
 
 def _missed_from(varied: Varied, span: Range, values: Sequence[float]) -> float | None:
     """The lowest value, of some rising ones and to the tolerance, at which the schedule misses deadlines."""
-    bracket = first_failure(lambda value: bool(schedule(varied.at(value)).missed), values, span.tolerance)
-    return None if bracket is None else bracket.bad
+    missed = first_failure(
+        lambda value: bool(schedule(varied.at(value)).missed), values, span.tolerance, geometric=span.geometric
+    )
+    return None if missed is None else missed.bad
 
 
 def _own_value_in_words(varied: Varied, span: Range, models: Mapping[str, Model]) -> list[str]:
@@ -188,20 +191,21 @@ _ALWAYS = ("local_limit", "large_signal_limit")
 """Fields that are shown also where they have no value"""
 _IN_ITS_UNIT = (
     *_ALWAYS, "local_limit_outside", "local_accuracy", "local_lower_limit", "mean_square_limit",
-    "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from", "tolerance", "scan",
+    "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from",
 )  # fmt: skip
 """Fields in the unit of the quantity"""
-_OF_UNITS = ("unit", "judged_unit")
+_HIDDEN = ("unit", "judged_unit", "geometric")
 
 
 def as_text(limit: Limit) -> dict[str, str]:
     """The applicable fields of a limit as text; of the evaluated values their number."""
     units = {**dict.fromkeys(_IN_ITS_UNIT, limit.unit), "judged_bound": limit.judged_unit, "horizon": "s"}
     known = {name: value for name, value in vars(limit).items() if value not in (None, "", ())}
-    texts = dict.fromkeys((name for name in vars(limit) if name in (*known, *_ALWAYS) and name not in _OF_UNITS), "-")
+    texts = dict.fromkeys((name for name in vars(limit) if name in (*known, *_ALWAYS) and name not in _HIDDEN), "-")
     for name in texts.keys() & known.keys():
         value = known[name]
         texts[name] = quantity(value, units.get(name), DIGITS) if isinstance(value, float) else str(value)
+    texts |= dict(zip(("scan", "tolerance"), limit.resolution))
     if limit.flies_above:
         texts["flies_above"] = ", ".join(quantity(value, limit.unit, DIGITS) for value in limit.flies_above)
     if limit.missed_by:
@@ -248,8 +252,9 @@ def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> 
             if below is None:
                 return value
             return bisected(
-                trials.is_refuted, below, value, trials.span.tolerance, remaining=trials.expect_remaining
-            ).bad
+                trials.is_refuted, below, value, trials.span.tolerance, geometric=trials.span.geometric,
+                remaining=trials.expect_remaining,
+            ).bad  # fmt: skip
         below = value
     return None
 
@@ -269,7 +274,7 @@ def _note(
         parts.append(
             f"that nine seeds in ten are good is refuted at {span.text(refuted)}: {describe(trials.tried[refuted])}"
         )
-    parts.append(f"what is narrower than the scan, {span.text(span.step)}, is not seen")
+    parts.append(f"what is narrower than the scan, {span.step_text}, is not seen")
     least, most = min(trials.tried), max(trials.tried)
     if least > span.values()[0] or most < span.values()[-1]:
         where = f"from {span.text(least)} to {span.text(most)}" if least < most else f"only {span.text(least)}"
@@ -280,21 +285,22 @@ def _note(
         parts.append(found.reason)
     if local is None:
         return parts
-    measured = None if bracket is None else bracket.good
-    if measured is None:
+    if bracket is None or bracket.good is None:
         return [*parts, f"the local limit is {span.text(local)}"]
+    measured, failed, gap = bracket.good, bracket.bad, GAP * abs(local)
     slowly = f"a run of {quantity(trials.varied.system.stop_time, 's')} does not show slow growth"
-    if measured > (1.0 + GAP) * local:
+    if measured > local + gap:
         return [
             *parts,
             f"more than a tenth beyond the local limit of {span.text(local)}, from which on small motions grow: it "
             f"may oscillate, and what is judged is good still; {slowly}",
         ]
-    if measured < (1.0 - GAP) * local:
+    if failed < local - gap:
         return [
             *parts,
             f"more than a tenth below the local limit of {span.text(local)}: what is judged fails earlier, by large "
             "signals or as small ones decay too slowly for the horizon, which a longer --stop-time tells",
         ]
-    beyond = f", from which on small motions grow: {slowly}" if measured > local + span.tolerance else ""
-    return [*parts, f"within a tenth of the local limit of {span.text(local)}{beyond}"]
+    beyond = f", from which on small motions grow: {slowly}" if measured - local > failed - measured else ""
+    coarsely = ", to the tolerance" if max(local - measured, failed - local) > gap else ""
+    return [*parts, f"within a tenth of the local limit of {span.text(local)}{coarsely}{beyond}"]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from orchestration.experiments.limits.evaluation import Evaluation
-from orchestration.foundation.basics.bisection import DIGITS
+from orchestration.foundation.basics.bisection import DIGITS, step_in_words
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.results import html
@@ -73,9 +73,11 @@ class Limit:
     horizon: float
     """The stop time [s], by which the criterion must be met."""
     tolerance: float
-    """The width of the last bracket."""
+    """The width of the last bracket; of a geometric scan as a share of the value."""
     scan: float
     """The step of the scan; good or bad intervals between two of its values are not seen."""
+    geometric: bool = False
+    """Whether the scan is by equal factors, as over more than a decade: `scan` is one."""
     confidence: float | None
     """The confidence, for each value (not for the search), that at least `RELIABILITY` of all seeds are good; None:
     nothing is random."""
@@ -91,14 +93,22 @@ class Limit:
     """Remarks beyond the verdict, in one sentence."""
 
     @property
+    def resolution(self) -> tuple[str, str]:
+        """The step of the scan and the tolerance, in words."""
+        step = step_in_words(self.scan, self.unit, geometric=self.geometric)
+        if self.geometric:
+            return step, f"{100.0 * self.tolerance:g} %"
+        return step, quantity(self.tolerance, self.unit, DIGITS, self.scan)
+
+    @property
     def verdict(self) -> str:
         """The last good value, the first that is not and how it failed, and how finely that was searched."""
 
         def shown(value: float) -> str:
             return quantity(value, self.unit, DIGITS)
 
-        tolerance = quantity(self.tolerance, self.unit, DIGITS, self.scan)
-        resolution = f"scan {shown(self.scan)}, tolerance {tolerance}"
+        step, tolerance = self.resolution
+        resolution = f"scan {'by ' if self.geometric else ''}{step}, tolerance {tolerance}"
         seeds = f", all of {self.seeds} seeds" if self.seeds > 1 else ""
 
         def how(one: Evaluation) -> str:

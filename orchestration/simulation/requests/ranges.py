@@ -8,7 +8,7 @@ from functools import cached_property
 from numbers import Real
 
 from orchestration.components.fmi.read_description import Model, Variable
-from orchestration.foundation.basics.bisection import Range
+from orchestration.foundation.basics.bisection import Range, is_wide
 from orchestration.foundation.basics.errors import UsageError, expected_name
 from orchestration.foundation.basics.terminal import inform
 from orchestration.foundation.basics.times import NANOSECONDS
@@ -26,6 +26,8 @@ QUANTITIES = (PERIOD, "delay", "jitter", "loss")
 """Names of quantities that a request may have; any other is a path"""
 STEPS, PARTS = 20, 50
 """Number of steps of the scan of a given range, and of tolerances in a step"""
+PER_DECADE, SHARE = 5, 0.01
+"""Of a range by equal factors: steps in a decade, at least, and the tolerance as a share of the value"""
 OWN = 0.2
 """Share of the file's own delay that is the unit of its range where it is more than a period"""
 
@@ -93,7 +95,8 @@ def search_range(
 ) -> Range:
     """The range in which a limit is searched, by default a `share` of it; raises `UsageError` for an invalid one.
 
-    From the value of the system itself, if that lies in it, the search goes up and down.
+    From the value of the system itself, if that lies in it, the search goes up and down. Without a default, a range of
+    one sign and of more than a decade is scanned by equal factors, unless a step or a tolerance is given.
     """
     for flag, value in (("from", first), ("to", last), ("tolerance", tolerance), ("scan", scan)):
         if value is not None and not isinstance(value, Real):
@@ -113,11 +116,21 @@ def search_range(
     high = last if last is not None else low + share * (known.last - low) if known is not None else 0.0
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise UsageError(f"--from {low:g} --to {high:g}: expected finite numbers, the first one smaller")
+    for flag, value in (("from", first), ("to", last)):
+        try:
+            if value is not None:
+                varied.at(value)
+        except UsageError as error:
+            raise UsageError(f"--{flag} {value:g}: {error}") from None
     if known is not None and named is None and (first is None or last is None):
         inform(f"--of {varied.of}: searched from {low:g} to {high:g}{after(known.unit)}; --from and --to set others")
     before = known.before if known is not None and first is None else ()
     own = own_value(varied, models)
-    step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
+    if geometric := known is None and scan is None and tolerance is None and is_wide(low, high):
+        decades = abs(math.log10(high / low))
+        step, tolerance = 10.0 ** (decades / max(STEPS, math.ceil(PER_DECADE * decades))), SHARE
+    else:
+        step = scan if scan is not None else known.step if known is not None else float(f"{(high - low) / STEPS:.12g}")
     return Range(
         own=own if own is not None and min((*before, low)) <= own <= high else None,
         before=before,
@@ -126,6 +139,7 @@ def search_range(
         last=high,
         tolerance=tolerance if tolerance is not None else known.tolerance if known is not None else step / PARTS,
         unit=known.unit if known is not None else after(unit_at(varied.paths[0], models)).strip() or None,
+        geometric=geometric,
     )
 
 

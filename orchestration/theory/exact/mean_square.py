@@ -40,7 +40,8 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
         return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) - 1.0
 
     values = span.values()
-    bracket = ends_of_good(lambda value: above(value) >= 0.0, values, span.own, LIMIT_TOLERANCE * span.tolerance).upper
+    width = LIMIT_TOLERANCE * span.tolerance
+    bracket = ends_of_good(lambda value: above(value) >= 0.0, values, span.own, width, geometric=span.geometric).upper
     if bracket is None:
         return LinearLimit(reason=f"second moments are bounded up to {span.text(values[-1])}, where the scan ends")
     if bracket.good is None:

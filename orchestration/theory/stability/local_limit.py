@@ -248,10 +248,12 @@ def _middle(bracket: Bracket | None) -> float | None:
 def _first_growth(growth: Growth, span: Range, method: str, finer: float | None) -> LinearLimit:
     """The values between which small deviations decay, by a scan and bisection; without `finer` by secants."""
     values, growth = span.values(), cache(_naming_values(growth, span))
-    width = span.tolerance * (1.0 if finer is None else finer)
-    ends = ends_of_good(lambda value: growth(value) > 0.0, values, span.own, width)
+    share = 1.0 if finer is None else finer
+    ends = ends_of_good(
+        lambda value: growth(value) > 0.0, values, span.own, share * span.tolerance, geometric=span.geometric
+    )
     if finer is None:
-        ends, width = Ends(*(_by_secants(growth, span, end) for end in ends)), LOOP_ZERO * width
+        ends, share = Ends(*(_by_secants(growth, span, end) for end in ends)), LOOP_ZERO
     lower, upper = map(_middle, ends)
     reason = ""
     if ends.upper is None:
@@ -260,5 +262,9 @@ def _first_growth(growth: Growth, span: Range, method: str, finer: float | None)
     elif upper is None:
         reason = f"small deviations grow at {span.text(values[0])}, where the scan begins"
     return LinearLimit(
-        limit=upper, lower=lower, method=method, accuracy=None if upper is None else width, reason=reason
+        limit=upper,
+        lower=lower,
+        method=method,
+        reason=reason,
+        accuracy=None if upper is None else share * span.tolerance_at(upper),
     )

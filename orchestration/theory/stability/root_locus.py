@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.bisection import Bracket, Range
+from orchestration.foundation.basics.bisection import Bracket, Range, is_wide
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
@@ -49,8 +49,6 @@ COUNT = 40
 SHARE = 0.2
 """Share of the range of a limit by default, farther than which nearly all loops have long left the circle"""
 MAX_COUNT = 10_000
-DECADE = 10.0
-"""Ratio of the ends of a range from which on its values are those of a geometric sequence"""
 ALIKE = 1e-8
 """Distance of the two sides of a jump of a delay, at most [s]"""
 ON_CIRCLE = 1e-5
@@ -201,11 +199,6 @@ def locus(
     return isolated_call(files.fmus.values(), _root_locus, varied, span, count)
 
 
-def _is_wide(first: float, last: float) -> bool:
-    """Whether the ends of a range are of one sign, and more than a decade apart."""
-    return first * last > 0.0 and not 1.0 / DECADE <= last / first <= DECADE
-
-
 def _spaced(span: Range, count: int, spaced: Callable[[float, float, int], Floats]) -> list[float]:
     return [short(float(value), span.unit) for value in spaced(span.values()[0], span.last, count)]
 
@@ -226,7 +219,7 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
             return sorted([own, *(value for value in values if not math.isclose(value, own))])
 
         rates = commensurate(at, with_own(span.values() if count is None else _spaced(span, count, np.linspace)))
-        geometric = rates is None and _is_wide(span.values()[0], span.last)
+        geometric = rates is None and is_wide(span.values()[0], span.last)
         spaced = _spaced(span, count or COUNT, np.geomspace if geometric else np.linspace)
         values = with_own(spaced) if rates is None else rates.scan
         if not values:

@@ -67,6 +67,10 @@ def test_a_number_has_few_digits_and_a_prefix_where_its_unit_takes_one(
             {"large_signal_limit": None, "tried": (replace(BAD, value=0.001),)},
             f"period not good even at 1 ms, where the scan begins: diverged {RESOLUTION}",
         ),
+        (
+            {"scan": 1.585, "tolerance": 0.01, "geometric": True},
+            "period good up to 35.25 ms; diverges at 35.5 ms (scan by a factor of 1.6, tolerance 1 %)",
+        ),
         ({"seeds": 29}, f"period good up to 35.25 ms, all of 29 seeds; diverges at 35.5 ms {RESOLUTION}"),
     ],
 )

@@ -156,6 +156,28 @@ def test_good_values_around_the_own_one_have_both_ends_and_those_apart_from_it_a
     assert ends_of_good(lambda value: value < 2.6, values, 3.0, 0.5) == Ends(Bracket(3.0, 2.5), None)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_over_decades_both_ends_of_good_values_are_found_by_equal_factors_to_a_share(sign: float) -> None:
+    of_fmu = Varied(request=example("double_integrator"), of="components.controller.parameters.k_d")
+    models = files_of(of_fmu.system).models_of(of_fmu.system)
+    first, last = sorted((sign * 1e-3, sign * 1e9))
+    span = search_range(of_fmu, models, first=first, last=last, tolerance=None, scan=None)
+    assert [abs(value) for value in span.values()[:: int(sign)]][:5] == [0.001, 0.00158, 0.00251, 0.00398, 0.00631]
+    assert (span.values()[0], span.values()[-1], span.step_text) == (first, last, "a factor of 1.6")
+    ends = ends_of_good(
+        lambda value: not 700.0 < sign * value < 1800.0, span.values(), sign * 1000.0, span.tolerance,
+        geometric=span.geometric, parts=5,
+    )  # fmt: skip
+    for end, edge in zip(ends if sign > 0.0 else ends[::-1], (700.0, 1800.0)):
+        assert end is not None
+        assert end.good is not None
+        assert sorted((sign * end.good, sign * end.bad, edge))[1] == edge
+        assert abs(end.bad / end.good - 1.0) < 0.0101
+    assert span.tolerance_at(sign * 700.0) == pytest.approx(7.0)
+    for low, high, tolerance, scan in ((first, last, 1.0, None), (first, last, None, 1e5), (0.0, 1e9, None, None)):
+        assert not search_range(of_fmu, models, first=low, last=high, tolerance=tolerance, scan=scan).geometric
+
+
 def test_the_own_value_is_scanned_where_it_lies_in_the_range() -> None:
     varied = Varied(request=example("dc_servo", {"connections.command.delay": 0.0047}), of="connections.command.delay")
     span = search_range(varied, {}, first=None, last=None, tolerance=None, scan=None)
@@ -558,6 +580,15 @@ def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
     assert "within a tenth of the local limit" in limits.limit(scenario_of(), "period").note
 
 
+@pytest.mark.usefixtures("stubbed")
+def test_a_limit_as_coarse_as_its_tolerance_is_not_said_to_be_below_the_local_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(limits, "local_limits", lambda varied, span: LinearLimit(limit=0.06))
+    note = limits.limit(scenario_of(), "period", first=0.02, scan=0.06, tolerance=0.06).note
+    assert note.endswith("within a tenth of the local limit of 60 ms, to the tolerance")
+
+
 def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
     tasks = {name: {"period": 0.004, "priority": i, "execution": 0.002} for i, name in enumerate(("fast", "load"))}
     system = system_from_tables({"stop_time": 0.1, "computers": {"cpu": {"tasks": tasks}}}, Path())
@@ -806,7 +837,7 @@ def test_find_runs_the_scenario_and_its_result_is_json() -> None:
         "of", "unit", "judged", "judged_unit", "judged_bound", "local_limit", "local_method", "local_accuracy",
         "local_limit_outside", "local_lower_limit", "mean_square_limit", "large_signal_limit",
         "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from", "missed_by", "follows", "horizon",
-        "tolerance", "scan", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
+        "tolerance", "scan", "geometric", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
     }  # fmt: skip
     limit = found.large_signal_limit
     assert limit is not None
@@ -839,6 +870,7 @@ def test_find_of_a_random_quantity_is_the_same_with_any_number_of_workers(worker
         ({"tolerance": math.nan}, "tolerance = nan: expected a positive number"),
         ({"scan": 0.0}, "scan = 0.0: expected a positive number"),
         ({"scan": math.inf}, "scan = inf: expected a positive number"),
+        ({"of": "loss", "last": 1.52}, "last = 1.52: .*loss = 1.52: expected a probability in"),
         ({"confidence": 0.0}, "confidence = 0.0: expected a number between 0 and 1"),
         ({"confidence": 1.0}, "confidence = 1.0: expected a number between 0 and 1"),
         ({"confidence": math.nan}, "confidence = nan: expected a number between 0 and 1"),

@@ -359,6 +359,12 @@ def test_the_mean_square_limit_is_a_line_of_the_figure() -> None:
     assert np.asarray(line.get_xdata()) == pytest.approx([70.0, 70.0])
 
 
+def test_a_limit_that_is_scanned_by_equal_factors_has_a_logarithmic_axis() -> None:
+    (axes,) = limit_figure.limit_figure(limit("timing.loss", geometric=True)).axes
+    assert axes.get_xscale() == "log"
+    assert [text.get_text() for text in axes.get_xticklabels()][1:-1] == ["20", "40", "60", "80", "100"]
+
+
 def test_where_no_loop_is_known_no_process_is_started_for_its_radius(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
