@@ -1,7 +1,7 @@
 """Local limits: where small deviations from an operating point cease to decay."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
 from functools import cache
@@ -126,12 +126,20 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
             for value, grows in zip(_beside(end, growth, growths, span, both), both)
         ):
             return replace(found, limit=_as_accurate(found.limit, found), lower=_as_accurate(found.lower, found))
-    for value in sorted(near, key=lambda value: abs(value - end)):
-        if at(value).uses_scheduler and repeating_period(deterministic(at(value))) is None:
+
+        def repeats(value: float) -> bool:
+            return not at(value).uses_scheduler or repeating_period(deterministic(at(value))) is not None
+
+        unknown = next((v for v in sorted(near, key=lambda v: abs(v - end)) if not repeats(v)), None)
+        if unknown is not None:
+            before = filter(repeats, sorted((v for v in growths if v < end), reverse=True))
+            decays = list(takewhile(lambda v: growths[v] < 0.0, before))
+            if decays and _rate(at, instances, known, OTHER_SIZE, decays[0]) > 0.0:
+                decays.clear()
             return LinearLimit(
-                reason=f"no local limit: at {span.text(value)} the schedule of computers and networks is not known to "
-                "repeat, so that no law of one period says whether small deviations grow: expected values at which it "
-                "repeats soon, as expect tells"
+                reason=f"no local limit: {_tried_before(decays, span)}at {span.text(unknown)} the schedule of "
+                "computers and networks is not known to repeat, so that no law of one period says whether small "
+                "deviations grow: expected values at which it repeats soon, as expect tells"
             )
     return LinearLimit(
         reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
@@ -178,6 +186,12 @@ def _known_at_own(at: Callable[[float], System], span: Range, instances: Instanc
     return known
 
 
+def _tried_before(decays: Sequence[float], span: Range) -> str:
+    """What small deviations do at values at which they decay, in words; empty without such values."""
+    ends = dict.fromkeys(map(span.text, (min(decays), max(decays)))) if decays else ()
+    return f"small deviations decay at what was tried before, {' to '.join(ends)}; " if ends else ""
+
+
 def _naming_values(growth: Growth, span: Range) -> Growth:
     """The same, whose errors say at which value there is no loop at rest, and what has been found before."""
     decays = list[float]()
@@ -186,9 +200,7 @@ def _naming_values(growth: Growth, span: Range) -> Growth:
         try:
             found = growth(value)
         except (NotAnEquilibriumError, ImpreciseError) as error:
-            ends = dict.fromkeys(map(span.text, (min(decays), max(decays)))) if decays else ()
-            before = f"small deviations decay at what was tried before, {' to '.join(ends)}; " if ends else ""
-            raise type(error)(f"{before}at {span.text(value)}: {error}") from error
+            raise type(error)(f"{_tried_before(decays, span)}at {span.text(value)}: {error}") from error
         decays.extend([value] if found < 0.0 else [])
         return found
 

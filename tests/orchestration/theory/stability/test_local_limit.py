@@ -81,6 +81,31 @@ def test_a_pulse_that_rounding_blurs_is_not_believed(
     assert ("depends on how small they are" in found.reason) == (limit is None)
 
 
+@pytest.mark.parametrize(("small", "large"), [(-1.0, -1.0), (-1.0, 1.0)])
+def test_beyond_a_schedule_that_repeats_deviations_decay_up_to_the_last_value_at_which_it_does(
+    monkeypatch: pytest.MonkeyPatch, small: float, large: float
+) -> None:
+    """From 0.5 on it does not, and growth is by chance; a larger pulse has to decay, too."""
+
+    def growth(system: Any, _: Any, factor: float = 1.0, *others: Any) -> Growth:
+        chance = 1.0 if factor == 1.0 else -1.0
+        known = large if factor == local_limit.OTHER_SIZE else small
+        return Growth(rate=chance if system.stop_time >= 0.5 else known, horizon=1.0)
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise UsageError("no saved states")
+
+    monkeypatch.setattr(local_limit, "growth_of", growth)
+    monkeypatch.setattr(local_limit, "growth_of_loop", refuse)
+    monkeypatch.setattr(local_limit, "keep_start", lambda *_: None)
+    monkeypatch.setattr(System, "uses_scheduler", True)
+    monkeypatch.setattr(local_limit, "repeating_period", lambda nominal: 1.0 if nominal.stop_time < 0.49 else None)
+    reason = local_limit.about_rest(at, SPAN).reason
+    known = "small deviations decay at what was tried before, 50 ms to 487.5 ms; "
+    assert reason.startswith(f"no local limit: {known if large < 0.0 else ''}at 5")
+    assert "is not known to repeat" in reason
+
+
 def test_growth_is_confirmed_on_the_side_of_a_limit_where_the_loop_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond 0.52 a task has no time left, and what is left of the loop is stable."""
 
