@@ -432,5 +432,13 @@ function mapLayout() {
 
 function axisLayout(axis) {
   const type = axis.words ? "category" : axis.logarithmic ? "log" : "linear";
-  return { title: { text: escaped(titled(axis.label, axis.unit)) }, type, words: axis.words, zeroline: false };
+  return { title: { text: escaped(titled(axis.label, axis.unit)) }, type, words: axis.words, zeroline: false, ...ticksAtValues(axis) };
+}
+
+/** Ticks at the values of an axis that has a few, apart from one another: beyond them nothing was run. */
+function ticksAtValues(axis) {
+  const values = valuesOf(axis);
+  const apart = (values.at(-1) - values[0]) / 12;
+  if (axis.words || axis.logarithmic || values.length > 8 || values.some((value, i) => i > 0 && value - values[i - 1] < apart)) return {};
+  return { tickvals: values, ticktext: values.map((value) => String(Number(value.toPrecision(6)))) };
 }

@@ -352,6 +352,7 @@ def test_of_two_studies_over_one_axis_the_metric_of_all_seeds_is_drawn_with_the_
         swept.append(sweep(load_study(tables), out=tmp_path / name))
     page = show(report(*swept, out=tmp_path / "both.html", flights=0))
     drawn = page.evaluate("document.getElementById('map-plot').data.map(({ name, x, y }) => [name, x, y])")
+    assert page.locator("#map-plot text").all_text_contents()[:2] == ["0", "0.3"]  # ticks across: values that there are
     page.close()
     heights = {name: (x, y) for name, x, y in drawn}
     for name, outcome in (("low", "bounded"), ("high", "settled")):
