@@ -8,6 +8,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
@@ -102,9 +103,11 @@ def _averages(system: System) -> list[str]:
 def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[float | None]:
     """The mean-square radii of systems; None for one that is not linear about a rest, or too large."""
     loops, found = Loops(models), list[float | None]()
-    for system in systems:
-        try:
-            found.append(loops.radius(system, agree=SURE_TOLERANCE))
-        except QuadcosimError:
-            found.append(None)
+    with progress_bar("means of squares") as report:
+        for i, system in enumerate(systems):
+            report(i / len(systems))
+            try:
+                found.append(loops.radius(system, agree=SURE_TOLERANCE))
+            except QuadcosimError:
+                found.append(None)
     return found

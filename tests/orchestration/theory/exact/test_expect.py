@@ -3,7 +3,9 @@
 import dataclasses
 import json
 import math
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -126,6 +128,14 @@ def test_a_loop_with_too_many_fourth_moments_says_so(monkeypatch: pytest.MonkeyP
     assert (found.fourth_moment_radius, found.reasons) == (
         None, {"fourth_moment_radius": "too many fourth moments to compute"},
     )  # fmt: skip
+
+
+def test_radii_of_many_systems_show_how_far_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    shares = list[float]()
+    monkeypatch.setattr(mean_square, "Loops", lambda _: SimpleNamespace(radius=lambda _, agree: agree))
+    monkeypatch.setattr(mean_square, "progress_bar", lambda _: nullcontext(shares.append))
+    assert mean_square.radii_of(cast("Any", [None, None]), {}) == [mean_square.SURE_TOLERANCE] * 2
+    assert shares == [0.0, 0.5]
 
 
 def as_simulated(**changes: Any) -> float:
