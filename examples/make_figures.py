@@ -181,7 +181,7 @@ def distributed_servo() -> Figure:
     periods, delays = np.linspace(0.001, 0.016, 31), np.linspace(0.0, 0.016, 33)
     cost, radius = (np.full((len(delays), len(periods)), np.nan) for _ in range(2))
     for j, period in enumerate(periods.tolist()):
-        varied = changed(system, {f"components.controller.{key}": period for key in PERIOD})
+        varied = changed(system, {"components.controller.sampling.period": period})
         loops = Loops(files_of(system).models)
         for i, delay in enumerate(delays.tolist()):
             found = loops.solve(changed(varied, {"connections.command.delay": delay}))
@@ -206,9 +206,6 @@ def distributed_servo() -> Figure:
 
 NO_END = 1e9
 """replaces a cost that is not finite, for the contours beside it"""
-PERIOD = ("sampling.period", "parameters.period")
-"""Keys of the PD controller: the period of its samples, and that for which it is programmed"""
-
 
 FIGURES: dict[str, Callable[[], Figure]] = {
     draw.__name__: draw

@@ -32,7 +32,7 @@ from orchestration.systems.system.check import check, connect_references
 from orchestration.systems.system.connection import component_of
 from orchestration.systems.system.files import located
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed, value_at
+from orchestration.systems.system.paths import changed, value_at, with_followers
 from orchestration.systems.system.request import Request, errors_in_own_terms
 
 SHIPPED = Path(__file__).with_name("paper_flight.html")
@@ -229,7 +229,7 @@ def _document(
             targets[own] = [at[each] for each in paths]
     sliders = []
     for each in chosen.sliders:
-        paths = request.paths_of(each.path)
+        paths = with_followers(system, request.paths_of(each.path))
         missing = [path for path in paths if path not in at]
         if missing:
             why = f"; {given}, so its timing is that of the file" if given else ""

@@ -21,11 +21,17 @@ class MisfitError(Exception):
     """A value is not known to fit."""
 
 
+class MarkedFloat(float):
+    """A number of which its class says more."""
+
+
 @dataclass(frozen=True)
 class Before:
     """In an annotation: a function that is applied to a value before it is checked."""
 
     function: Callable[[Any], Any]
+    keeps_marks: bool = False
+    """Whether a `MarkedFloat` fits as it is"""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         from pydantic_core import core_schema
@@ -112,6 +118,8 @@ def _of_annotated(value: Any, parts: tuple[Any, ...], from_file: bool) -> Any:
     kind, *metadata = parts
     for one in metadata:
         value = _if(isinstance(one, Before), one).function(value)
+        if one.keeps_marks and isinstance(value, MarkedFloat):
+            return value
     return fitted(value, kind, from_file=from_file)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from typing_extensions import dataclass_transform
 
 from orchestration.foundation.basics.errors import WHOLE_NUMBER, UsageError, no_such_key, shown
-from orchestration.foundation.basics.fitting import Before, MisfitError, fitted, hints_of
+from orchestration.foundation.basics.fitting import Before, MarkedFloat, MisfitError, fitted, hints_of
 from orchestration.foundation.processes.passable import passable
 
 if TYPE_CHECKING:
@@ -33,14 +33,15 @@ class _Scalar(Before):
 
         truth, real, text = core_schema.bool_schema(), core_schema.float_schema(), core_schema.str_schema()
         whole = core_schema.int_schema(ge=-(2**63), lt=2**63)
+        marked = core_schema.is_instance_schema(MarkedFloat)
         only_float = core_schema.chain_schema([core_schema.is_instance_schema(float), real])
         return core_schema.json_or_python_schema(
             core_schema.union_schema([truth, whole, real, text], mode="left_to_right"),
-            core_schema.union_schema([only_float, truth, whole, text], mode="left_to_right"),
+            core_schema.union_schema([marked, only_float, truth, whole, text], mode="left_to_right"),
         )
 
 
-Scalar = Annotated[bool | int | float | str, _Scalar(lambda value: value)]
+Scalar = Annotated[bool | int | float | str, _Scalar(lambda value: value, keeps_marks=True)]
 """The value of an FMU's parameter or of an axis"""
 
 _CONFIG: "pydantic.ConfigDict" = {"extra": "forbid", "strict": True, "arbitrary_types_allowed": True}

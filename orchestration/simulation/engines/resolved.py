@@ -14,6 +14,7 @@ from orchestration.components.fmi.read_description import NUMERIC, DeclaredClock
 from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.engines import sources
 from orchestration.simulation.engines.algebraic_loops import describe_loops
 from orchestration.simulation.results import objectives
@@ -23,12 +24,20 @@ from orchestration.systems.schedule.plan import FixedStep
 from orchestration.systems.schedule.streams import VALUE, Streams
 from orchestration.systems.signals.library import make_signal
 from orchestration.systems.system.check import check, connect_references, describe_references, recorded_variables
-from orchestration.systems.system.component import Component, Sampling, has_scheduled_instants, instance_of
+from orchestration.systems.system.component import (
+    OWN_PERIOD,
+    Component,
+    Sampling,
+    has_scheduled_instants,
+    instance_of,
+)
 from orchestration.systems.system.connection import MOTION, Source, component_of, variable_of
 from orchestration.systems.system.model import System, expressions
 from orchestration.systems.system.placement import tasks_of
 from orchestration.systems.system.request import Request, errors_in_own_terms
 
+PERIOD = "period"
+"""The parameter by which a law usually has the period that it is programmed for"""
 Announce = Callable[[str], None]
 """Receives a line for each thing that is done before the run begins."""
 
@@ -328,6 +337,22 @@ def other_periods_in_words(system: System, models: Mapping[str, Model]) -> list[
         f"{name} ({models[name].name}): its code believes {believed:g} s; at other periods this is the limit of that "
         "code, whose constants of time stay, not of a design for each period"
         for name, (_, believed) in unbelieved_periods(system, models).items()
+    ]
+
+
+def kept_periods_in_words(base: System, varied: System, models: Mapping[str, Model]) -> list[str]:
+    """What runs over periods mean for each component with a parameter `period` that is a number, that of its samples in
+    the file, where another sampling period is varied.
+    """
+    before, now = numeric_parameters(base, models), numeric_parameters(varied, models)
+    return [
+        f'{name} keeps its parameter period of {quantity(kept, "s")}; with {PERIOD} = "{OWN_PERIOD}" under its '
+        "parameters it follows"
+        for name, one in varied.components.items()
+        if one.sampling is not None
+        and (kept := now.get(f"{name}.{PERIOD}")) not in (None, one.sampling.period)
+        and kept == before[f"{name}.{PERIOD}"] == getattr(base.components[name].sampling, PERIOD)
+        and models[name].variables[PERIOD].unit == "s"
     ]
 
 

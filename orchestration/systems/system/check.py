@@ -8,7 +8,7 @@ from orchestration.components.fmi.kit import TRAJECTORY, USE_REFERENCE_INPUTS
 from orchestration.components.fmi.read_description import NUMERIC, Model, Variable
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, expected_name, listed
 from orchestration.systems.expressions.syntax import Name, names, parse, parts
-from orchestration.systems.system.component import Parameter
+from orchestration.systems.system.component import OWN_PERIOD, OwnPeriod, Parameter
 from orchestration.systems.system.connection import MOTION, Connection, Source, component_of, variable_of
 from orchestration.systems.system.conversion import BECOMES, OtherQuantity, conversion
 from orchestration.systems.system.model import System, expressions
@@ -63,8 +63,13 @@ def check(system: System, models: Mapping[str, Model]) -> None:
 def check_parameter(system: System, models: Mapping[str, Model], name: str, parameter: str) -> None:
     """Raise `UsageError` for a parameter that the FMU of a component does not have, or for an invalid value."""
     value, fed = system.components[name].parameters[parameter], f"{name}.{parameter}"
-    is_fed = any(fed in x.end for x in system.connections)
-    expect_parameter(f"components.{name}.parameters.{parameter}", models[name], parameter, value, is_fed=is_fed)
+    is_fed, place = any(fed in x.end for x in system.connections), f"components.{name}.parameters.{parameter}"
+    variable = models[name].variables.get(parameter)
+    if variable is not None and variable.kind == "Real" and isinstance(value, str):
+        raise UsageError(f'{place} = {value}: expected a number, or "{OWN_PERIOD}": that of its component')
+    if variable is not None and isinstance(value, OwnPeriod) and variable.unit not in (None, "s"):
+        raise UsageError(f"{place} = {OWN_PERIOD}: expected a number in {variable.unit}; {OWN_PERIOD} is in s")
+    expect_parameter(place, models[name], parameter, value, is_fed=is_fed)
 
 
 def _check_divergence(condition: str, models: Mapping[str, Model]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from orchestration.components.fmi.access import SCHEDULED, USUAL, Access, Interface, Solver
 from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.fitting import MarkedFloat
 from orchestration.foundation.basics.records import Scalar, record
 from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
 from orchestration.systems.system.choices import Align, Clock, Spread
@@ -119,7 +120,22 @@ def has_scheduled_instants(sampling: Sampling) -> bool:
     return isinstance(sampling, (TaskSampling, SamplingOnArrival))
 
 
+OWN_PERIOD = "sampling.period"
+
+
+class OwnPeriod(MarkedFloat):
+    """The value of a parameter that follows the sampling period of its component, which is `OWN_PERIOD` in a file."""
+
+
 Parameter = Scalar
+
+
+def with_own_period(parameters: Mapping[str, Parameter], sampling: Sampling | None) -> Mapping[str, Parameter]:
+    """The parameters, of which those that follow the period have that of the sampling; without one, unchanged."""
+    following = [name for name, value in parameters.items() if value == OWN_PERIOD or isinstance(value, OwnPeriod)]
+    if sampling is None or not following:
+        return parameters
+    return {**parameters, **dict.fromkeys(following, OwnPeriod(sampling.period))}
 
 
 @record()
@@ -129,7 +145,8 @@ class Component:
     fmu: str
     """The name of one of this project's FMUs, or the path of an .fmu file; in a file, relative to its folder."""
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
-    """The parameters to set, by their names in the FMU and in the units that it declares."""
+    """The parameters to set, by their names in the FMU and in the units that it declares; the text `sampling.period`
+    has a parameter in seconds follow the component's period, whatever sets it."""
     step: float | None = None
     """The distance of the communication points [s] of a component in continuous time; a component has either this or
     `sampling`."""
@@ -168,11 +185,14 @@ class Component:
         return Access(interface=interface, solver=self.solver, clock=clock, start_time=self.start_time or 0.0)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", with_own_period(self.parameters, self.sampling))
         if self.tolerance is not None:
             require_positive(self, "tolerance")
         if self.start_time is not None:
             require(is_finite(self.start_time), "start_time", self.start_time, "a finite number")
         if self.step is not None:
+            for name, value in self.parameters.items():
+                require(value != OWN_PERIOD, f"parameters.{name}", value, "a number: beside step there is no sampling")
             require_positive(self, "step")
             require(is_at_least(self.step, 1.0), "step", self.step, "at least a nanosecond")
         if self.points:

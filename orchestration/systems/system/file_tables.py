@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestration.components.building.models import PATHS
+from orchestration.systems.system.component import OWN_PERIOD, OwnPeriod
 
 
 def tables_of(system: Any) -> dict[str, Any]:
@@ -62,4 +63,6 @@ def in_toml(value: Any) -> Any:
         return str(value.absolute())
     if isinstance(value, tuple):
         return list(value)
-    return dict(value) if isinstance(value, Mapping) else value
+    if isinstance(value, Mapping):
+        return {key: OWN_PERIOD if isinstance(one, OwnPeriod) else one for key, one in value.items()}
+    return value

@@ -9,7 +9,15 @@ from orchestration.components.building.models import PATHS
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import UsageError, did_you_mean, prefixed
 from orchestration.foundation.basics.records import replaced
-from orchestration.systems.system.component import Component, Sampling, SamplingOnArrival, TaskSampling
+from orchestration.systems.system.component import (
+    OWN_PERIOD,
+    Component,
+    OwnPeriod,
+    Sampling,
+    SamplingOnArrival,
+    TaskSampling,
+    with_own_period,
+)
 from orchestration.systems.system.computers import Arrivals, Computer, Network
 from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.distribution import parsed_fields
@@ -152,6 +160,16 @@ def value_at(system: System, path: str) -> Any:
     return found.get(inner) if inner else found
 
 
+def with_followers(system: System, paths: Iterable[str]) -> tuple[str, ...]:
+    """The paths, and those of the parameters that follow the period at any of them."""
+    found = [*paths]
+    for name, component in system.components.items():
+        if f"{_COMPONENTS}{name}.{OWN_PERIOD}" in found:
+            own = (key for key, value in component.parameters.items() if isinstance(value, OwnPeriod))
+            found += [parameter_path(f"{name}.{key}") for key in own]
+    return tuple(found)
+
+
 def _connection(system: System, name: str) -> Connection:
     return next(x for x in system.connections if x.name == name)
 
@@ -287,7 +305,7 @@ def _component(place: str, component: Component, keys: Mapping[str, Any]) -> Com
     if sampling:
         rest["sampling"] = _replaced(f"{place}.sampling", component.sampling, sampling)
     if rest.keys() == {"sampling"} and "fmu_clock" not in sampling:  # nothing else in a component depends on it
-        return replaced(component, **rest)
+        return replaced(component, **rest, parameters=with_own_period(component.parameters, rest["sampling"]))
     return _replaced(place, component, rest) if rest else component
 
 

@@ -16,6 +16,7 @@ from orchestration.components.fmi.instance import NO_STATE, Instance, Loader
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.records import replaced
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.foundation.basics.terminal import stated_beside_bar
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
@@ -114,7 +115,7 @@ class Start:
         components, saved, tuned = dict[str, Component](), dict(self.saved), dict[str, Mapping[str, Parameter]]()
         for name, one in self.components.items():
             old, new = one.parameters, system.components[name].parameters
-            components[name] = replace(one, parameters=new)
+            components[name] = replaced(one, parameters=new)
             if old != new:
                 tuned[name] = {key: value for key, value in new.items() if old.get(key) != value}
                 if old.keys() - new.keys() or not self.tunable.issuperset(f"{name}.{key}" for key in tuned[name]):
@@ -134,7 +135,7 @@ def _untimed(one: Component) -> Component:
     if one.sampling is None:
         return replace(one, step=1.0)
     sampling = Sampling(period=1.0, fmu_clock=one.sampling.fmu_clock, offset=one.sampling.offset)
-    return replace(one, sampling=sampling)
+    return replaced(one, sampling=sampling)  # parameters that follow the period stay
 
 
 class KnownTangents(dict[str, tuple[Component, Fraction, AnyTangent]]):
