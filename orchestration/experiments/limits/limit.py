@@ -7,7 +7,7 @@ from typing import Literal
 
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.components.fmi.read_description import Model
-from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator, describe
+from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluation, Evaluator, describe
 from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
 from orchestration.foundation.basics.bisection import DIGITS, Bracket, Range, bisected, ends_of_good, first_failure
 from orchestration.foundation.basics.errors import UsageError
@@ -115,10 +115,12 @@ def limit(
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
     note += _own_value_in_words(varied, span, models) if bracket is not None and bracket.good is None else []
     note += _starved(varied, span, scheduled) if local.limit is None else []
+    note += _overloaded(missed_from, local, span)
     note += other_periods_in_words(varied.at(span.last), models)
     note += kept_periods_in_words(varied.system, varied.at(span.last), models)
     metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
     tried = trials.measuring(metric)
+    note += _insensitive(tried, metric, units.get(metric or ""))
     return Limit(
         of=of, unit=span.unit, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else bound_of(varied.system, metric),
@@ -286,22 +288,45 @@ def _note(
         parts.append(found.reason)
     if local is None:
         return parts
+    accuracy = found.accuracy or 0.0
+    where = span.text(local) + (f" ± {span.text(accuracy)}" if accuracy > span.tolerance else "")
     if bracket is None or bracket.good is None:
-        return [*parts, f"the local limit is {span.text(local)}"]
-    measured, failed, gap = bracket.good, bracket.bad, GAP * abs(local)
+        return [*parts, f"the local limit is {where}"]
+    measured, failed, gap = bracket.good, bracket.bad, max(GAP * abs(local), accuracy)
     slowly = f"a run of {quantity(trials.varied.system.stop_time, 's')} does not show slow growth"
     if measured > local + gap:
         return [
             *parts,
-            f"more than a tenth beyond the local limit of {span.text(local)}, from which on small motions grow: it "
+            f"more than a tenth beyond the local limit of {where}, from which on small motions grow: it "
             f"may oscillate, and what is judged is good still; {slowly}",
         ]
     if failed < local - gap:
         return [
             *parts,
-            f"more than a tenth below the local limit of {span.text(local)}: what is judged fails earlier, by large "
+            f"more than a tenth below the local limit of {where}: what is judged fails earlier, by large "
             "signals or as small ones decay too slowly for the horizon, which a longer --stop-time tells",
         ]
+    if abs(measured - local) <= accuracy:
+        return [*parts, f"not told apart from the local limit, which is {where}"]
     beyond = f", from which on small motions grow: {slowly}" if measured - local > failed - measured else ""
     coarsely = ", to the tolerance" if max(local - measured, failed - local) > gap else ""
-    return [*parts, f"within a tenth of the local limit of {span.text(local)}{coarsely}{beyond}"]
+    return [*parts, f"within a tenth of the local limit of {where}{coarsely}{beyond}"]
+
+
+def _insensitive(tried: Sequence[Evaluation], metric: str | None, unit: str | None) -> list[str]:
+    """The note where the judged objective is the same at all of several values, as where nothing moves."""
+    first = tried[0].measured
+    if first is None or len(tried) == 1 or any(one.measured != first for one in tried):
+        return []
+    same = quantity(first, unit)
+    return [f"{metric} is {same} at each value tried, as where nothing moves: this says nothing of the limit"]
+
+
+def _overloaded(missed_from: float | None, local: LinearLimit, span: Range) -> list[str]:
+    """The note on a local limit among values at which deadlines are missed."""
+    if missed_from is None or local.limit is None or local.limit < missed_from:
+        return []
+    return [
+        f"where deadlines are missed, from {span.text(missed_from)} on, stability need not be an interval: others "
+        "below the local limit may be unstable, and others above it stable"
+    ]

@@ -578,6 +578,9 @@ def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
     assert "within a tenth of the local limit" in limits.limit(scenario_of(), "period").note
+    monkeypatch.setattr(limits, "local_limits", lambda varied, span: LinearLimit(limit=0.07, accuracy=0.01))
+    note = limits.limit(scenario_of(), "period").note
+    assert note.endswith("not told apart from the local limit, which is 70 ms ± 10 ms")
 
 
 @pytest.mark.usefixtures("stubbed")
@@ -596,6 +599,9 @@ def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
     span = Range(first=0.001, step=0.0015, last=0.004, tolerance=1e-5)
     assert limits._missed_from(varied, span, [0.001, 0.002]) is None  # 100 % busy, and in time
     assert limits._missed_from(varied, span, [0.001, 0.0025, 0.003]) == pytest.approx(0.002 + 0.5e-5, abs=0.5e-5)
+    late = limits._overloaded(0.002, LinearLimit(limit=0.003), span)
+    assert late[0].startswith("where deadlines are missed, from 2 ms on, stability need not be an interval")
+    assert limits._overloaded(0.004, LinearLimit(limit=0.003), span) == []
     varied = Varied(request=system, of="computers.cpu.tasks.fast.execution")
     assert limits._starved(varied, span, [0.001, 0.0025]) == []  # late, and done
     assert limits._starved(varied, span, [0.0025, 0.004, 0.005]) == [
@@ -624,6 +630,7 @@ def test_a_range_without_failures_or_without_good_values_is_noted(
     nothing_fails = limits.limit(scenario_of(), "jitter")
     assert nothing_fails.large_signal_limit is None
     assert "good throughout the scan" in nothing_fails.verdict
+    assert "ultimate_bound is 10 mm at each value tried, as where nothing moves" in nothing_fails.note
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0)
     nothing_good = limits.limit(scenario_of(), "delay")
     assert nothing_good.large_signal_limit is None
