@@ -84,6 +84,7 @@ def test_what_is_written_rightly_is_read(kind: str, tmp_path: Path) -> None:
         ("system", "constant", "constnt", "constant"),
         ("system", "diverged", "divergd", "diverged"),
         ("system", "parameters", "paramters", "parameters.NAME"),
+        ("system", "diverged", "div", "diverged"),
         ("study", "[base]", "[bas]", "base"),
         ("study", "period", "perod", "period"),
         ("study", "samples", "sampels", "samples"),

@@ -12,6 +12,8 @@ MAX_MESSAGE_LENGTH = 4000
 """Largest number of characters in a message: names in it may come from a file and have any length"""
 WHOLE_NUMBER = "a whole number from -2^63 to 2^63 - 1, or a float, as 1e19"
 """The words for what may be in place of a longer whole number"""
+BEGINNING = 3
+"""Least length of a beginning for which a name is taken"""
 A_FLOAT = "a whole number that a float holds: all are up to 2**53"
 """The words for what of an integer of 64 bits a run can have"""
 
@@ -109,10 +111,11 @@ def no_such_key(table: str, key: str, known: Sequence[str], beside: str = "") ->
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """The end of a message about an unknown `name`: the `most` known names that are closest to it, if any is close.
 
-    Capitals count as small letters: who writes `position.X` means `position.x`.
+    Capitals count as small letters: who writes `position.X` means `position.x`. Those that `name` begins come first.
     """
-    in_small = {each.casefold(): each for each in known}
-    close = difflib.get_close_matches(name.casefold(), list(in_small), n=most)
+    in_small, small = {each.casefold(): each for each in known}, name.casefold()
+    begun = sorted((each for each in in_small if len(small) >= BEGINNING and each.startswith(small)), key=len)
+    close = [*dict.fromkeys([*begun, *difflib.get_close_matches(small, list(in_small), n=most)])][:most]
     return f"; did you mean {' or '.join(in_small[each] for each in close)}?" if close else ""
 
 
