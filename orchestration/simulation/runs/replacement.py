@@ -117,7 +117,7 @@ def names_of(system: System, models: Mapping[str, Model]) -> tuple[str, ...]:
     return (*dict.fromkeys((*columns_of(system), *columns)),)
 
 
-def component_named(system: System, component: str | None, to: str) -> str:
+def component_named(system: System, component: str | None, to: str, *, only_sampled: bool = False) -> str:
     """A component by name, None: the only sampled one; raises `UsageError` stating what it is needed for (`to`)."""
     sampled = [name for name, each in system.components.items() if each.sampling is not None]
     if component is None:
@@ -127,8 +127,10 @@ def component_named(system: System, component: str | None, to: str) -> str:
                 f"--component: expected the NAME of the one {to}, of the {len(sampled)} that are sampled: {listed}"
             )
         component = sampled[0]
-    if component not in system.components:
-        raise UsageError(f"component: {component}: {expected_name(str(component), list(system.components))}")
+    known = sampled if only_sampled else list(system.components)
+    if component not in known:
+        what = f"{component} is not sampled" if component in system.components else component
+        raise UsageError(f"component: {what}: {expected_name(str(component), known)}")
     return component
 
 

@@ -210,9 +210,14 @@ def expect_rows(system: System, tasks: Sequence[SampledTask], links: Sequence[Ra
         on_grid = sends_on_grid and link.delay_jitter.is_certain and on_grid_all(*link.send_offsets, *lateness)
         read_later = system.components[system.connections[i].receiver].sampling is not None and not link.is_measured
         if not on_grid and (not single or read_later):
+            expected = "a step of which its delay is a multiple"
+            if not link.delay_jitter.is_certain:
+                expected = "no delay_jitter"
+            elif not sends_on_grid:
+                expected = "a sender without jitter, whose period and offset are multiples of a step"
             raise UsageError(
-                f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}: expected a step of "
-                "which its delay is a multiple, or expect without --as-simulated"
+                f"--as-simulated: {link.name} arrives between the steps of {', '.join(continuous)}: expected "
+                f"{expected}, or expect without --as-simulated"
             )
         if link.is_read_ahead and Fraction(link.longest_delay, ATTOSECONDS) % step:
             raise UsageError(

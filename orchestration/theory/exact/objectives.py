@@ -39,6 +39,8 @@ class Mean:
 
 def means_of(node: syntax.Node) -> list[syntax.Call]:
     """The means in an objective, `rms` included; raises `UsageError` naming any other reduction."""
+    if of_jobs := next(filter(syntax.names_job_measure, names(node)), None):
+        raise UsageError(f"{of_jobs}: of the jobs of a task there are no expectations: expected a mean of signals")
     found = list(dict.fromkeys(reductions(node)))
     for call in found:
         if call.function not in ("mean", "rms"):

@@ -133,10 +133,7 @@ def sampled_component(system: System, component: str | None) -> str:
             "{ period = SECONDS }, as quadcosim connect PLANT.fmu CONTROLLER.fmu proposes; the matrices of one FMU are "
             "those of quadcosim linearise PLANT.fmu, in Python plant_at_start"
         )
-    name = component_named(system, component, "at which to cut the loop open")
-    if system.components[name].sampling is None:
-        raise UsageError(f"component: {name}: expected a sampled component")
-    return name
+    return component_named(system, component, "at which to cut the loop open", only_sampled=True)
 
 
 def cut_open(loop: AtRest, name: str) -> Linearised:

@@ -16,13 +16,18 @@ from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
+from orchestration.systems.expressions.syntax import parse
 from orchestration.systems.system.component import Component
 from orchestration.systems.system.connection import Source
+from orchestration.systems.system.file import system_from_tables
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion, System
 from orchestration.theory.exact import mean_square, moments
+from orchestration.theory.exact.as_simulated import expect_rows
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
+from orchestration.theory.exact.objectives import means_of
+from orchestration.theory.exact.random_times import CERTAIN, RandomLink, RandomTime, SampledTask, exact_seconds
 from orchestration.theory.exact.timing import sampled_tasks
 from orchestration.theory.stability.matrices import SampledSystem
 from quadcosim import UsageError, limit
@@ -78,6 +83,8 @@ def test_objectives_that_are_no_means_of_squares_are_refused_by_name_and_the_rad
     assert found.objectives == {"middle": None, "late": None, "cost": None}
     assert found.reasons["cost"].startswith("integral(…): expected mean(…) or rms(…)")
     assert found.mean_square_radius == pytest.approx(0.9324**2, abs=1e-4)
+    with pytest.raises(UsageError, match=r"^mean\(missed\(inner\)\): of the jobs of a task there are no expectations"):
+        means_of(parse("mean(tank.level) + 2 * mean(missed(inner))"))
 
 
 def test_objectives_may_be_made_of_means_and_of_signals_that_no_connection_carries() -> None:
@@ -162,6 +169,27 @@ def test_with_finer_noise_and_rows_it_becomes_that_of_white_noise() -> None:
 def test_as_simulated_refuses_rows_at_which_the_plant_is_not_stepped() -> None:
     with pytest.raises(UsageError, match=r"measurement is measured between the steps of plant: expected .* of 0\.1 s"):
         as_simulated(connections__measurement__delay=0.05)
+
+
+def test_as_simulated_names_what_lets_a_message_arrive_between_the_steps() -> None:
+    tables: dict[str, Any] = {
+        "stop_time": 1.0,
+        "components": {
+            "drive": {"fmu": "a.fmu", "step": 1e-4},
+            "speed": {"fmu": "b.fmu", "sampling": {"period": 2e-3}},
+            "current": {"fmu": "c.fmu", "sampling": {"period": 2e-4}},
+        },
+        "connections": [{"name": "bus", "from": ["speed.y"], "to": ["current.u"], "delay": 6e-4, "delay_jitter": 4e-4}],
+    }
+    tasks = [SampledTask(name=n, period=exact_seconds(T)) for n, T in (("speed", 2e-3), ("current", 2e-4))]
+    late = RandomTime(values=(0, 4 * 10**14), probabilities=())
+    bus = RandomLink(name="connections.bus", size=1, sender=0, receiver=1, delay=6 * 10**14, delay_jitter=late)
+    system = system_from_tables(tables, Path())
+    with pytest.raises(UsageError, match=r"arrives between the steps of drive: expected no delay_jitter, or"):
+        expect_rows(system, tasks, [bus])
+    expect_rows(system, tasks, [dataclasses.replace(bus, delay_jitter=CERTAIN)])
+    with pytest.raises(UsageError, match=r"drive: expected a step of which its delay is a multiple, or"):
+        expect_rows(system, tasks, [dataclasses.replace(bus, delay_jitter=CERTAIN, delay=10**13)])
 
 
 @pytest.mark.parametrize(("burst", "expected"), [(None, 0.2240092377), (2.0, 0.1443375673)])

@@ -131,7 +131,7 @@ def test_a_delay_over_more_samples_than_are_tried_first_keeps_all_its_states() -
 @pytest.mark.parametrize(
     ("name", "component", "expected"),
     [
-        ("double_integrator", "plant", r"^component: plant: expected a sampled component$"),
+        ("double_integrator", "plant", r"^component: plant is not sampled: expected one of controller$"),
         ("double_integrator", "contoller", r"^component: contoller: did you mean controller\?"),
         ("four_components", None, r"of the 3 that are sampled: sensor, controller, engine$"),
     ],
