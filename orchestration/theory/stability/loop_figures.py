@@ -243,17 +243,22 @@ def _rows_of(axes: Axes, places: list[float], labels: list[str]) -> tuple[list[i
     """
     character = WIDTH * rcParams["font.size"] / 72.0 * axes.figure.dpi / axes.bbox.width
     taken, rows, lefts = [list[tuple[float, float]]() for _ in range(ROWS)], list[int | None](), list[bool]()
+    lines = list[tuple[float, int]]()
     to_share = axes.transScale + axes.transLimits
     for place, label in zip(places, labels):
         share, width = float(to_share.transform((place, 1.0))[0]), character * (len(label) + 1)
-        lefts.append(left := share > 1.0 - EDGE)
-        low, high = (share - width, share) if left else (share, share + width)
+        sides = [(share, share + width), (share - width, share)]
 
-        def is_free(row: int) -> bool:
-            over = any(a < high and low < b for a, b in taken[row])  # noqa: B023
-            return not over and not any(a < share < b for under in taken[row:] for a, b in under)  # noqa: B023
+        def is_free(row: int, low: float, high: float) -> bool:
+            across = any(low < line < high for line, end in lines if end <= row)
+            over = across or any(a < high and low < b for a, b in taken[row])
+            under = any(a < share < b for each in taken[row:] for a, b in each)  # noqa: B023
+            return low >= 0.0 and high <= 1.0 and not over and not under
 
-        rows.append(next((row for row in range(ROWS) if is_free(row)), None))
-        if rows[-1] is not None:
-            taken[rows[-1]].append((low, high))
+        row, side = next(((r, s) for r in range(ROWS) for s in (0, 1) if is_free(r, *sides[s])), (None, 0))
+        rows.append(row)
+        lefts.append(side == 1)
+        if row is not None:
+            taken[row].append(sides[side])
+            lines.append((share, row))
     return rows, lefts

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.bisection import Range
 from orchestration.systems.system.component import Sampling
@@ -16,6 +17,7 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import root_locus
 from orchestration.theory.stability.local_limit import about_rest
 from orchestration.theory.stability.loop_at_rest import whole_at_rest
+from orchestration.theory.stability.loop_figures import _rows_of
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
 from orchestration.theory.stability.root_locus import Crossing, RootLocus
@@ -183,3 +185,10 @@ def test_a_wide_locus_has_its_labels_in_the_panel_and_says_how_many_poles_lie_be
     for label in labels:
         assert panel.x0 <= label.x0 < label.x1 <= panel.x1
         assert curve <= label.y0 < label.y1 <= panel.y1 + 2.0
+
+
+def test_no_label_of_a_crossing_lies_over_the_line_of_another() -> None:
+    axes = Figure(figsize=(8.0, 2.5)).add_subplot()
+    axes.set_xlim(1.0, 12.0)
+    rows, lefts = _rows_of(axes, [6.14, 8.72, 9.48, 9.5, 11.8], ["6.14 ms", "8.72 ms", "9.48 ms", "9.5 ms", "11.8 ms"])
+    assert (rows, lefts) == ([0, 0, 1, 2, 0], [False, False, False, False, True])
