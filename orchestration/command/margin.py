@@ -130,13 +130,16 @@ def _of_hover(request: "Request") -> CommandResult:
     from orchestration.quadrotor.scenarios.scenario import Scenario
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
+    from orchestration.theory.stability.known_loops import warn_of_periods
 
     if not isinstance(request, Scenario):
         raise UsageError(
             "margin: expected a scenario of the quadrotor, or --of PATH, as connections.NAME.delay_jitter; the margins "
             "of gain, phase and a constant delay are those of quadcosim bode"
         )
-    found = isolated_call(files_of(system_of(request)).fmus.values(), margin_of, request)
+    files = files_of(system := system_of(request))
+    warn_of_periods(system, files)
+    found = isolated_call(files.fmus.values(), margin_of, request)
     document, lines = dataclasses.asdict(found), []
     for name, value in ((name, value) for name, value in document.items() if name != "in_double"):  # the verdict has it
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value

@@ -15,7 +15,7 @@ from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.terminal import ShareProgress, inform_in_passing, share_reporter
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.engines.master import Engine
-from orchestration.simulation.engines.resolved import check_against_fmus, kept_periods_in_words, other_periods_in_words
+from orchestration.simulation.engines.resolved import check_against_fmus, kept_periods_in_words, periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, own_value, search_range
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results.objectives import bound_of
@@ -116,7 +116,7 @@ def limit(
     note += _own_value_in_words(varied, span, models) if bracket is not None and bracket.good is None else []
     note += _starved(varied, span, scheduled) if local.limit is None else []
     note += _overloaded(missed_from, local, span)
-    note += other_periods_in_words(varied.at(span.last), models)
+    note += periods_in_words(varied.at(span.last), models, varied.at(values[0]))
     note += kept_periods_in_words(varied.system, varied.at(span.last), models)
     metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
     tried = trials.measuring(metric)

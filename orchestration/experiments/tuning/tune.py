@@ -18,7 +18,7 @@ from orchestration.experiments.tuning.tuning_file import gains_text, load_tuning
 from orchestration.experiments.tuning.tuning_problem import Costs, SearchResult, TuningProblem, best_by_period
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing, needs
-from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter
+from orchestration.foundation.basics.terminal import ShareProgress, inform, share_reporter, warn
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.engines.master import BATCH
 from orchestration.simulation.results import html
@@ -122,16 +122,16 @@ def tune(
     if isinstance(tuning, Tuning):
         if as_simulated:
             raise UsageError('--as-simulated: expected cost.by = "expect"; the cost of this tuning is that of runs')
-        done = _search_by_runs(tuning, folder, workers, dask, engine, progress, announce)
+        tuning, done = _search_by_runs(tuning, folder, workers, dask, engine, progress, announce)
     elif workers != 1 or engine != "auto" or dask is not None:
         raise UsageError("--workers, --dask and --engine: expected none; a tuning by expect makes no runs")
     else:
-        tuning = dataclasses.replace(tuning, as_simulated=as_simulated or tuning.as_simulated)
-        exact = dataclasses.replace(tuning, base=single_run_execution(tuning.base, "auto")[0])
+        base, _ = single_run_execution(tuning.base, "auto")
+        tuning = dataclasses.replace(tuning, as_simulated=as_simulated or tuning.as_simulated, base=base)
         with share_reporter(progress, "searching") as report:
-            find = functools.partial(search_exactly, exact)
+            find = functools.partial(search_exactly, tuning)
             done = run_searches(
-                exact, exact.files(), folder, find, ExactTuningResult, engine="", progress=report, announce=announce
+                tuning, tuning.files(), folder, find, ExactTuningResult, engine="", progress=report, announce=announce
             )
     return Tuned(searches=tuple(done), written=tuple(write(tuning, done, Path(out), command)))
 
@@ -144,8 +144,8 @@ def _search_by_runs(
     engine: EngineChoice,
     progress: ShareProgress,
     announce: Callable[[str], None],
-) -> list[TuningResult]:
-    """The results of the searches of a tuning by runs."""
+) -> tuple[Tuning, list[TuningResult]]:
+    """A tuning by runs, as it is run, and the results of its searches."""
     execution = choose_execution(
         engine, tuning.native, lambda native: dataclasses.replace(tuning, native=native).first_run()
     )
@@ -165,7 +165,7 @@ def _search_by_runs(
         ) -> TuningResult:
             return search(tuning, period, seed, run, pool.run_all, report, keeping)
 
-        return run_searches(
+        return tuning, run_searches(
             tuning, files, folder, find, TuningResult, engine=execution.name, progress=report, announce=announce
         )
 
@@ -186,6 +186,8 @@ def run_searches(
     They are kept in `folder`, with the costs of all points: of the same tuning with the same software and engine no
     search is repeated, and none that is interrupted evaluates a point again.
     """
+    for text in dict.fromkeys(text for period in tuning.searched_periods for text in tuning.warnings(period)):
+        warn(text)
     searches = [(period, seed) for period in tuning.searched_periods for seed in tuning.seeds]
     with open_record(_place(tuning, files, folder, kind, engine)) as record:
         done = record.results(kind)

@@ -118,6 +118,7 @@ def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[
         f"{best.evaluations} evaluations of {of}",
         *more,
         f"The loop is {'; '.join([describe_clock(system), *faults])}. By {software}.",
+        *tuning.warnings(best.period),
         f"Of {len(others)} searches that of seed {best.seed} is taken: it costs least on these, {best.cost:.5g}.",
         *(f"Seed {one.seed}: {one.judgement}." for one in others),
     ]

@@ -11,6 +11,7 @@ from orchestration.experiments.studies.axes import Axis
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.simulation.engines.resolved import periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, paths_in
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
@@ -130,6 +131,11 @@ class TuningProblem:
         with errors_in_own_terms(self.base):
             system = changed(self.origin, changes)
             return replace(system, objectives={**system.objectives, COST: self.cost})
+
+    def warnings(self, period: float | None) -> list[str]:
+        """A warning for each component whose code believes another period than it has in a search."""
+        system = self.system(period, self.values([0.5] * len(self.parameters)))
+        return periods_in_words(system, self.files().models_of(system))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -322,8 +322,15 @@ def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str,
     }
 
 
-def periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
-    """A warning for each such component of a run."""
+def periods_in_words(system: System, models: Mapping[str, Model], other: System | None = None) -> list[str]:
+    """A warning for each such component; of a range of systems, to an `other` one, for those whose period stays, and
+    for those whose period varies what it means.
+    """
+    if other is not None:
+        fixed = unbelieved_periods(other, models)
+        found = unbelieved_periods(system, models)
+        each = zip(found, periods_in_words(system, models), other_periods_in_words(system, models))
+        return [stays if fixed.get(name) == found[name] else varies for name, stays, varies in each]
     return [
         f"{name} ({models[name].name}): is sampled every {period:g} s, but its code believes {believed:g} s: what it "
         f"computes of time is wrong by a factor of {max(period / believed, believed / period):.6g}"

@@ -16,7 +16,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.exact.loops import Converged, Loops
 from orchestration.theory.exact.objectives import ObjectiveMeans
-from orchestration.theory.stability.known_loops import LOOPS, rested
+from orchestration.theory.stability.known_loops import LOOPS, rested, warn_of_periods
 
 
 @passable
@@ -78,6 +78,7 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
     with errors_in_own_terms(request):
         system = rested(request)
         files = files_of(system)
+        warn_of_periods(system, files)
         loops = Loops(files.models, simulated=as_simulated)
         return isolated_call(files.fmus.values(), expected_of, system, loops, horizon)
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.registry import Registry
+from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.processes.passable import passable
 
 if TYPE_CHECKING:
     from orchestration.foundation.basics.bisection import Range
     from orchestration.simulation.requests.ranges import Varied
+    from orchestration.systems.system.files import Files
     from orchestration.systems.system.model import System
     from orchestration.systems.system.request import Request
 
@@ -60,3 +62,11 @@ def rested(request: Request, *, checked: bool = True) -> System:
 
         resolve(request)
     return request.as_system()
+
+
+def warn_of_periods(system: System, files: Files, other: System | None = None) -> None:
+    """Warn of components whose code believes another period than theirs, as a run does; `other` as there."""
+    from orchestration.simulation.engines.resolved import periods_in_words  # not before: loads the engines
+
+    for text in periods_in_words(system, files.models_of(system), other):
+        warn(text)

@@ -23,7 +23,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.in_double import of_code
-from orchestration.theory.stability.known_loops import rested
+from orchestration.theory.stability.known_loops import rested, warn_of_periods
 from orchestration.theory.stability.lifted_component import lifted_names
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, expect_whole_instances, whole_at_rest
@@ -102,11 +102,15 @@ def linearise(request: RequestLike, component: str | None = None) -> Linearised:
     return in_isolation(request, _linearised, component)
 
 
-def in_isolation(request: RequestLike, find: Callable[[Request, Asked], Found], asked: Asked) -> Found:
+def in_isolation(
+    request: RequestLike, find: Callable[[Request, Asked], Found], asked: Asked, *, is_loop: bool = True
+) -> Found:
     """What `find` says of a request and, say, a component, in a process that may load its FMUs, or their twins."""
     loaded, _ = single_run_execution(request_of(request), "auto")
     with errors_in_own_terms(loaded):
-        files = files_of(system_of(loaded))
+        files = files_of(system := system_of(loaded))
+        if is_loop:
+            warn_of_periods(system, files)
     return isolated_call(files.fmus.values(), find, loaded, asked)
 
 

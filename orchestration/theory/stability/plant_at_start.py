@@ -87,7 +87,7 @@ def plant_at_start(request: RequestLike, period: float | None = None) -> PlantAt
     """
     if period is not None and not 0.0 < period < np.inf:
         raise UsageError(f"--period {period:g}: expected a positive number of seconds")
-    return in_isolation(request, _plant_at_start, period)
+    return in_isolation(request, _plant_at_start, period, is_loop=False)
 
 
 def _plant_at_start(request: Request, period: float | None) -> PlantAtStart:

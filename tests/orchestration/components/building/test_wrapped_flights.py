@@ -57,6 +57,39 @@ def test_its_local_limit_on_the_double_integrator_is_that_of_the_law(integrator:
     assert "its code believes 0.05 s; at other periods this is the limit of that code" in found.stdout
 
 
+def test_theory_and_a_tuning_at_another_period_warn_in_the_words_of_a_run(
+    integrator: Path, main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = (
+        "controller (Pd): is sampled every 0.1 s, but its code believes 0.05 s: what it computes of time is wrong by a "
+        "factor of 2"
+    )
+    gain = "components.controller.parameters.k_p"
+    slow = ("--set", "components.controller.sampling.period=0.1", "--set", "stop_time=10")
+    noisy, jitter = integrator.with_name("hit.toml"), "connections.command.delay_jitter"
+    noisy.write_text(integrator.read_text().replace("[criterion]", 'square = "mean(plant.x ** 2)"\n[criterion]'))
+    between = (gain, "--from", "0.9", "--to", "1.1")
+    for command in (
+        ["expect"], ["bode"], ["step"], ["locus", "--of", *between, "--count", "2"],
+        ["margin", "--of", jitter, "--to", "0.01"],
+    ):  # fmt: skip
+        name, *others = command
+        assert main(name, noisy, *others, *slow, "--build").stderr.count(f"warning: {told}\n") == 1, name
+    assert not main("expect", noisy, "--build").stderr
+    limited = main("limit", noisy, "--of", *between, "--scan", "0.1", *slow, "--json", "--build", "--no-figures")
+    assert json.loads(limited.stdout)["note"].count(told) == 1
+    tuning = tmp_path / "gains.toml"
+    tuning.write_text(
+        f'scenario = "{noisy.as_posix()}"\n[cost]\nof = "square"\nby = "expect"\n[search]\nperiods = [0.05, 0.1]\n'
+        f'evaluations = 1\nseeds = [1]\n[[parameters]]\nname = "k_p"\nsets = ["{gain}"]\nstart = 0.9\nstop = 1.1\n'
+    )
+    out = tmp_path / "out"
+    assert main("tune", tuning, "--out", out, "--build").stderr.count(f"warning: {told}\n") == 1
+    assert f"\n# {told}\n" in (out / "gains_100ms.toml").read_text()
+    assert "believes" not in (out / "gains_50ms.toml").read_text()
+
+
 def test_theory_asks_its_fmu_for_what_it_computes(integrator: Path, main: Main) -> None:
     text = integrator.read_text().replace('"controller.v"]', '"controller.v"]\nnoise = 0.01')
     noisy = integrator.with_name("noisy.toml")
