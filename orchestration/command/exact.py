@@ -57,7 +57,8 @@ def _lines(expected: "Expected") -> list[str]:
         "accuracy": f"{expected.accuracy:.1g} of each",
         "method": expected.method,
     }
-    lines = [*in_columns([*texts.items()])]
+    warning = [f"warning: {expected.doubt}"] if expected.doubt else []
+    lines = [*warning, *in_columns([*texts.items()])]
     if fourth is not None and expected.mean_square_radius < 1.0 <= fourth:
         lines.append("fourth moments are infinite: confidence intervals of mean squares over runs are meaningless here")
     names_by_reason: dict[str, list[str]] = {}

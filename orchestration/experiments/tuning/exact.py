@@ -46,11 +46,14 @@ class ExactTuningResult(SearchResult):
     """growth factor of second moments in a common period"""
     accuracy: float
     """relative, of the cost"""
+    doubt: str
+    """The reason why runs with these values may cost more, as of `expect`; empty: none is seen"""
 
     @property
     def judgement(self) -> str:
-        """The margin to an infinite cost, in words."""
-        return f"the mean-square radius is {self.mean_square_radius:.6g}"
+        """The margin to an infinite cost, in words, and what makes the cost doubtful."""
+        radius = f"the mean-square radius is {self.mean_square_radius:.6g}"
+        return f"{radius}; warning: {self.doubt}" if self.doubt else radius
 
     @property
     def figures(self) -> dict[str, float | None]:
@@ -69,10 +72,10 @@ def search_exactly(
     files = tuning.files()
     loops = Loops(files.models, simulated=tuning.as_simulated)
 
-    def expected(points: Sequence[Sequence[float]]) -> list[Expected | str]:
+    def expected(points: Sequence[Sequence[float]], flown: bool = False) -> list[Expected | str]:
         systems = [tuning.system(period, tuning.values(shares)) for shares in points]
         with errors_in_own_terms(tuning.base):
-            return isolated_call(files.fmus.values(), _expected, systems, loops)
+            return isolated_call(files.fmus.values(), _expected, systems, loops, flown)
 
     def costs(points: Sequence[Floats]) -> list[float]:
         return [_cost(each) for each in expected([point.tolist() for point in points])]
@@ -95,7 +98,7 @@ def search_exactly(
         return values
 
     best = minimise(tuning, seed, noted, progress)
-    (expectation,) = expected([best.shares.tolist()])
+    (expectation,) = expected([best.shares.tolist()], flown=True)
     assert isinstance(expectation, Expected)
     cost, without = expectation.objectives[COST], len(refused())
     return ExactTuningResult(
@@ -107,20 +110,21 @@ def search_exactly(
         note=f"{without} of {len(tried)} candidates had no expectation, the first, {told()}" if without else "",
         mean_square_radius=expectation.mean_square_radius,
         accuracy=expectation.accuracy,
+        doubt=expectation.doubt,
     )
 
 
-def _expected(systems: Sequence[System], loops: Loops) -> list[Expected | str]:
+def _expected(systems: Sequence[System], loops: Loops, flown: bool) -> list[Expected | str]:
     """The expectations of each system, in order, or why it has none, as one that does not come to rest.
 
     Raises `UsageError` if a cost has none whatever the parameters.
     """
-    return [_expected_or_why(system, loops) for system in systems]
+    return [_expected_or_why(system, loops, flown) for system in systems]
 
 
-def _expected_or_why(system: System, loops: Loops) -> Expected | str:
+def _expected_or_why(system: System, loops: Loops, flown: bool) -> Expected | str:
     try:
-        found = expected_of(system, loops)
+        found = expected_of(system, loops, flown=flown)
     except UsageError as error:
         return str(error)
     if found.objectives[COST] is None and found.mean_square_radius < 1.0:

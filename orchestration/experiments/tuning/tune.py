@@ -105,8 +105,8 @@ def tune(
 
     `tuning` may be the path of its file, or the content of the file as a dictionary, as `load_tuning` takes them.
     A `Tuning` runs an ensemble of initial conditions and is judged on others, by `workers` processes or those of a
-    `dask` scheduler, and an engine, as in `sweep`. An `ExactTuning` needs no runs; it linearises native FMUs if
-    available, and its expectations are `as_simulated` if so requested, as those of `expect`.
+    `dask` scheduler, and an engine, as in `sweep`. An `ExactTuning` needs no runs, but one that checks the
+    result; it linearises native FMUs if available, `as_simulated` if so requested, as `expect`.
 
     Writes a file of parameters into `out` for each period; it names `command` as its origin. Costs and results are
     kept in `folder`, default `results/NAME`: called again after an interruption, it loses the generation of points that

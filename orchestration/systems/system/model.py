@@ -119,10 +119,13 @@ class System:
     @property
     def depends_on_seed(self) -> bool:
         """Whether the seed changes its runs."""
-        return (
-            self.has_random_timing
-            or any(any(x.noise.values()) for x in self.connections)
-            or any(source.is_random and source.noise != 0.0 for source in self.sources.values())
+        return self.has_random_timing or self.has_noise
+
+    @property
+    def has_noise(self) -> bool:
+        """Whether connections or sources are noisy."""
+        return any(any(x.noise.values()) for x in self.connections) or any(
+            source.is_random and source.noise != 0.0 for source in self.sources.values()
         )
 
     def to_toml(self) -> str:

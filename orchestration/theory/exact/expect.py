@@ -14,6 +14,7 @@ from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import errors_in_own_terms
+from orchestration.theory.exact.flown import doubt
 from orchestration.theory.exact.loops import Converged, Loops
 from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.stability.known_loops import LOOPS, rested, warn_of_periods
@@ -44,6 +45,9 @@ class Expected:
     """The hyperperiod of all that samples [s]."""
     horizon: float | None = None
     """Time over which the means are, from initial conditions [s]; None: stationary ones."""
+    doubt: str = ""
+    """The reason why runs may have other means, where deviations become too large for a linear loop in one that begins
+    at rest; empty: none is seen, or there is no noise."""
 
     @property
     def verdict(self) -> str:
@@ -80,11 +84,11 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
         files = files_of(system)
         warn_of_periods(system, files)
         loops = Loops(files.models, simulated=as_simulated)
-        return isolated_call(files.fmus.values(), expected_of, system, loops, horizon)
+        return isolated_call(files.fmus.values(), expected_of, system, loops, horizon, True)
 
 
-def expected_of(system: System, loops: Loops, horizon: float | None = None) -> Expected:
-    """As `expect`, of a system whose FMUs are loaded in this process."""
+def expected_of(system: System, loops: Loops, horizon: float | None = None, flown: bool = False) -> Expected:
+    """As `expect`, of a system whose FMUs are loaded in this process; in doubt only if it is to be `flown`."""
     solution = loops.solve(system)
     linear, loop, means = solution.linear, solution.loop.result, solution.means
     converged: Converged[Any] = solution.loop
@@ -108,6 +112,7 @@ def expected_of(system: System, loops: Loops, horizon: float | None = None) -> E
         accuracy=converged.difference + of_components, period=solution.loop.period,
         method=_method(linear.methods, converged.order, system, simulated=loops.simulated, horizon=horizon),
         horizon=horizon,
+        doubt=doubt(system, linear.objectives, means, linear.start, loops.instances, horizon) if flown and means else ""
     )  # fmt: skip
 
 

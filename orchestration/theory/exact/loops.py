@@ -31,7 +31,7 @@ from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.timing import by_turns, links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain, costs_until
-from orchestration.theory.stability.loop_at_rest import ExtraSignals, whole_at_rest
+from orchestration.theory.stability.loop_at_rest import ExtraSignals, KnownTangents, Start, whole_at_rest
 from orchestration.theory.stability.matrices import OF_FIXED_STEP, Components, Continuous, SampledSystem
 from orchestration.theory.stability.periodic_schedule import periodic_schedule
 from orchestration.theory.stability.scheduled import without_scheduler
@@ -58,6 +58,8 @@ class Linear:
     objectives: ObjectiveMeans
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
+    start: Start | None
+    """Where it has come to rest; None: its operating point is at rest at once"""
     initial: InitialState | None = None
     """None: not requested"""
 
@@ -100,7 +102,7 @@ class Loops:
         self._identifier = ComponentIdentifier()
 
     @cached_property
-    def _instances(self) -> Instances:
+    def instances(self) -> Instances:
         """FMUs in the computing process, kept from system to system."""
         return Instances()
 
@@ -123,7 +125,8 @@ class Loops:
         objectives, initial_state = ObjectiveMeans(system, models), None
         stepped = [] if initial is None else [end for name in steps_of(initial) for end in initial.sources[name].to]
         extra = ExtraSignals(inputs=(*noise, *stepped), outputs=objectives.outputs)
-        with whole_at_rest(system, self._instances, extra=extra, models=models) as loop:
+        at_rest = KnownTangents()
+        with whole_at_rest(system, self.instances, extra=extra, models=models, known=at_rest) as loop:
             objectives.expand_about(loop)
             known = self._identifier.of(loop)
             parts = {name: one.part for name, one in known.items()}
@@ -136,7 +139,7 @@ class Loops:
                         )
                 tangents = {name: one.tangent for name, one in known.items()}
                 means = objectives.means.values()
-                initial_state = initial_state_of(initial, loop, parts, tangents, means, self._instances)
+                initial_state = initial_state_of(initial, loop, parts, tangents, means, self.instances)
         methods = {name: one.method for name, one in known.items()}
         accuracy = max((one.accuracy for one in known.values()), default=0.0)
         precision = max((one.precision for one in known.values()), default=0.0)
@@ -149,7 +152,7 @@ class Loops:
                 )
         return Linear(
             parts=parts, methods=methods, accuracy=accuracy, precision=precision, objectives=objectives, noise=noise,
-            initial=initial_state,
+            start=at_rest.start, initial=initial_state,
         )  # fmt: skip
 
     def radius(self, system: System, *, agree: float) -> float:

@@ -152,6 +152,8 @@ class ObjectiveMeans:
         self.calls: dict[str, list[Call]] = {}
         self.reasons: dict[str, str] = {}
         self.means: dict[Call, Mean] = {}
+        self.rest: dict[str, float] = {}
+        """values of the signals of objectives at rest, once expanded"""
         self._numbers: Mapping[str, float] = {}
         for name, node in self._nodes.items():
             try:
@@ -170,18 +172,18 @@ class ObjectiveMeans:
         """Expand the means as polynomials about the point where the loop rests."""
         for name, state in loop.saved_states.items():
             loop.simulation.instances[name].restore(state)
-        rest = {
+        self.rest = {
             signal: float(loop.simulation.instances[component_of(signal)].get(variable_of(signal)))
             for signal in self._signals
         }
         for name, source in self._system.sources.items():
-            rest |= constant_signals(name, source)
+            self.rest |= constant_signals(name, source)
         self._numbers = loop.simulation.parameters
         for name, calls in [*self.calls.items()]:
             try:
                 for call in calls:
                     if call not in self.means:
-                        mean = quadratic(integrand(call), rest, self._numbers)
+                        mean = quadratic(integrand(call), self.rest, self._numbers)
                         _expect_current(self._system, mean.signals)
                         self.means[call] = mean
             except UsageError as error:

@@ -83,7 +83,7 @@ def test_a_cost_without_an_expectation_is_refused_by_its_reason() -> None:
 def test_a_candidate_without_a_rest_is_passed_over_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     least = 0.0
 
-    def restless(system: System, loops: Loops) -> Expected:
+    def restless(system: System, loops: Loops, flown: bool) -> Expected:
         if (K := system.components["controller"].parameters["K"]) > least:
             raise NotAnEquilibriumError("the operating point is not at rest")
         return replace(EXPECTED, objectives={COST: -K})
@@ -100,13 +100,16 @@ def test_a_candidate_without_a_rest_is_passed_over_and_named(tmp_path: Path, mon
 
 
 def test_a_cost_is_that_of_what_runs_print_if_so_requested(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def known(system: System, loops: Loops) -> Expected:
-        return replace(EXPECTED, objectives={COST: 1.0 if loops.simulated else 2.0})
+    def known(system: System, loops: Loops, flown: bool) -> Expected:
+        doubt = "a run diverges" if flown else ""
+        return replace(EXPECTED, objectives={COST: 1.0 if loops.simulated else 2.0}, doubt=doubt)
 
     monkeypatch.setattr(exact, "expected_of", known)
     found = tune(tuning(evaluations=3), out=tmp_path, folder=tmp_path, as_simulated=True, progress=None, announce=None)
     assert found.searches[0].cost == 1.0
     assert "evaluations of the exact expectation, as simulated, of (J)." in found.written[0].read_text()
+    assert "the mean-square radius is 0.5; warning: a run diverges." in found.written[0].read_text()
+    assert found.verdict.endswith("; warning: a run diverges")  # a run of the tuned ones only
     assert tuned(tuning(evaluations=3), tmp_path).searches[0].cost == 2.0
 
 

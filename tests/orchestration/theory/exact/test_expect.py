@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import re
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +23,7 @@ from orchestration.systems.system.connection import Source
 from orchestration.systems.system.file import system_from_tables
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion, System
-from orchestration.theory.exact import mean_square, moments
+from orchestration.theory.exact import flown, mean_square, moments
 from orchestration.theory.exact.as_simulated import expect_rows
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
@@ -143,6 +144,24 @@ def test_radii_of_many_systems_show_how_far_they_are(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(mean_square, "progress_bar", lambda _: nullcontext(shares.append))
     assert mean_square.radii_of(cast("Any", [None, None]), {}) == [mean_square.SURE_TOLERANCE] * 2
     assert shares == [0.0, 0.5]
+
+
+@pytest.mark.parametrize("rests", [{}, {"after": 3.0}])
+def test_a_run_with_noise_that_leaves_what_is_linear_puts_the_expectation_in_doubt(
+    rests: dict[str, float], main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    system = dataclasses.replace(example("minimum_variance"), operating_point=rests)
+    narrow = dataclasses.replace(system, criterion=Criterion(diverged="abs(plant.x) > 1.5"))
+    assert expect(system).doubt == ""
+    found = expect(narrow)
+    assert re.match(r"a run from rest with this noise \(seed 0\) diverges after \d[.\d]* s: the expect", found.doubt)
+    assert found.objectives == expect(system).objectives
+    assert not expect(dataclasses.replace(narrow, sources={})).doubt  # rests
+    path = tmp_path / "system.toml"
+    path.write_text(narrow.to_toml())
+    assert main("expect", path).stdout.splitlines()[1] == f"warning: {found.doubt}"
+    monkeypatch.setattr(flown, "BY_CHANCE", 0.1)
+    assert "has a mean(plant.x ** 2) of more than 0.1 times the expected" in expect(system).doubt
 
 
 def as_simulated(**changes: Any) -> float:
