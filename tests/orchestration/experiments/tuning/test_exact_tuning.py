@@ -156,7 +156,7 @@ def test_several_sampled_components_are_tuned_at_their_own_periods_and_no_others
     with pytest.raises(UsageError, match=r"search\.periods: expected a .*; leave out search\.periods to keep the p"):
         tuning(base=twice)
 
-    def known(system: System, loops: Loops) -> Expected:
+    def known(system: System, loops: Loops, flown: bool) -> Expected:
         periods = (one.sampling.period for one in system.components.values() if isinstance(one.sampling, Sampling))
         seen.add(tuple(periods))
         return replace(EXPECTED, objectives={COST: float(system.components["controller"].parameters["K"])})
