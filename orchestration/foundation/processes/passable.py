@@ -5,11 +5,11 @@ from typing import TypeVar
 Class = TypeVar("Class", bound=type)
 
 PASSABLE: dict[str, type] = {}
-"""Dataclasses and exceptions by their full names"""
+"""Dataclasses, exceptions and floats of a class of their own by their full names"""
 
 
 def passable(cls: Class) -> Class:
-    """Decorate a dataclass or an exception whose objects may be sent."""
+    """Decorate a dataclass, an exception or a class of floats whose objects may be sent."""
     PASSABLE[full_name(cls)] = cls
     return cls
 

@@ -28,7 +28,7 @@ DEEPEST = 32
 _MOST_DIMENSIONS = 8
 _NUMBERS = "biufc"
 """Kinds of the dtypes of arrays"""
-_TUPLE, _INTEGER, _ARRAY, _RECORD, _ERROR, _PATH, _SET, _FRACTION, _COMPLEX = range(9)
+_TUPLE, _INTEGER, _ARRAY, _RECORD, _ERROR, _PATH, _SET, _FRACTION, _COMPLEX, _FLOAT = range(10)
 """Codes of what MessagePack does not have"""
 _Plain = str | bool | int | float | None
 
@@ -103,6 +103,8 @@ def _extended(value: Any) -> Any:
     if full_name(type(value)) in PASSABLE and dataclasses.is_dataclass(value):
         fields = [getattr(value, field.name) for field in dataclasses.fields(value)]
         return _ext(_RECORD, [full_name(type(value)), fields])
+    if isinstance(value, float) and full_name(type(value)) in PASSABLE:
+        return _ext(_FLOAT, [full_name(type(value)), float(value)])
     if isinstance(value, BaseException):
         return _packed_error(value)
     if isinstance(value, Mapping):
@@ -170,6 +172,14 @@ def _record(data: bytes, depth: int) -> Any:
     return made
 
 
+def _float(data: bytes, depth: int) -> float:
+    name, value = unpack(data, depth)
+    cls: Any = PASSABLE.get(expect(name, str), object)
+    if not issubclass(cls, float):
+        raise FrameError("expected a class of floats that there is")
+    return cls(expect(value, float))
+
+
 def _error(data: bytes, depth: int) -> BaseException:
     names, text, attributes = unpack(data, depth)
     expect(attributes, dict[str, _Plain])
@@ -192,6 +202,7 @@ _READERS: Mapping[int, Callable[[bytes, int], Any]] = {
     _SET: lambda data, depth: frozenset(expect(unpack(data, depth), list[Any])),
     _FRACTION: lambda data, depth: Fraction(*expect(unpack(data, depth), list[int])),
     _COMPLEX: lambda data, depth: complex(*expect(unpack(data, depth), list[float])),
+    _FLOAT: _float,
 }
 _SCALARS: Mapping[Any, Any] = {
     float: (int, float, np.integer, np.floating), int: (int, np.integer), bool: (bool, np.bool_),

@@ -14,6 +14,7 @@ from orchestration.foundation.basics.errors import UsageError, shown
 from orchestration.foundation.basics.fitting import MarkedFloat
 from orchestration.foundation.basics.records import Scalar, record
 from orchestration.foundation.basics.times import exact_nanoseconds, is_at_least
+from orchestration.foundation.processes.passable import passable
 from orchestration.systems.system.choices import Align, Clock, Spread
 from orchestration.systems.system.distribution import (
     Varying,
@@ -123,6 +124,7 @@ def has_scheduled_instants(sampling: Sampling) -> bool:
 OWN_PERIOD = "sampling.period"
 
 
+@passable
 class OwnPeriod(MarkedFloat):
     """The value of a parameter that follows the sampling period of its component, which is `OWN_PERIOD` in a file."""
 

@@ -30,7 +30,16 @@ class NotInTheTable:
     where: str
 
 
+@passable
+class Litres(float):
+    pass
+
+
 class LeakError(Exception):
+    pass
+
+
+class NotALitre(float):
     pass
 
 
@@ -38,7 +47,7 @@ def test_data_come_back_as_they_were() -> None:
     for value in (
         None, True, -3, 2**200, 0.1, float("inf"), "text", "\udcff", b"bytes", [1, [2.0]], (1, (2, "three")),
         {"a": (1,)}, {(1, 2): None}, frozenset({"b", "a"}), Fraction(1, 3), Path("a/b"), np.float32(0.1), np.int64(3),
-        1 - 2j, Leak(where="tank", rate=None, parts=(Leak(where="valve", rate=1.0),)),
+        1 - 2j, Litres(0.1), Leak(where="tank", rate=None, parts=(Leak(where="valve", rate=1.0),)),
     ):  # fmt: skip
         back = unpack(pack(value))
         assert (back, type(back)) == (value, type(value))
@@ -63,7 +72,8 @@ def test_an_error_comes_back_by_the_nearest_class_in_the_table() -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [object(), threading.Lock(), len, NotInTheTable("tank"), np.array(["text"]), np.array([None])]
+    "value",
+    [object(), NotALitre(1.0), threading.Lock(), len, NotInTheTable("tank"), np.array(["text"]), np.array([None])],
 )
 def test_what_is_no_data_cannot_be_sent(value: object) -> None:
     with pytest.raises(TypeError, match="no data that a process may send"):
