@@ -40,6 +40,8 @@ LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
 FEWEST_INSTANTS, MOST_INSTANTS = 100, 400
 """instants of a run at which the twins are compared"""
+LONGEST_SCHEDULE = 100
+"""Longest repetition of a schedule, in longest periods: a run compares a hundred of them"""
 DELAYS = 24
 """values of each signal over which the law is fitted, in addition to those in transit"""
 NOISE = 1e-9
@@ -101,13 +103,14 @@ def growth_of(system: System, instances: Instances, factor: float = 1.0, known: 
 def repeating_period(nominal: System) -> Fraction | None:
     """After how long the periods of a system and the schedule of its computers and networks repeat [ns].
 
-    None: they are not known to.
+    None: they are not known to, within `LONGEST_SCHEDULE`.
     """
     own = operating_point.hyperperiod_of(nominal)
-    if not nominal.uses_scheduler:
+    if own is None or not nominal.uses_scheduler:
         return own
     with suppress(UsageError):
-        return own and operating_point.hyperperiod([own, NANOSECONDS * periodic_schedule(nominal).period])
+        found = operating_point.hyperperiod([own, NANOSECONDS * periodic_schedule(nominal).period])
+        return found if found <= LONGEST_SCHEDULE * operating_point.longest_period(nominal) else None
     return None
 
 
