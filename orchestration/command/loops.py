@@ -133,6 +133,7 @@ def locus(
             "real": x.z.real,
             "imaginary": x.z.imag,
             "frequency": x.frequency,
+            "turn": x.turn,
             "accuracy": x.accuracy,
         }
         for x in found.crossings

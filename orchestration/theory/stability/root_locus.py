@@ -35,6 +35,7 @@ from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, ke
 from orchestration.theory.stability.operating_point import (
     NotAnEquilibriumError,
     longest_period,
+    periods_of,
 )
 from orchestration.theory.stability.period_map import OTHER_PULSE, growth_of_loop, period_map
 from orchestration.theory.stability.poles import Complexes, in_words, poles_of
@@ -72,7 +73,10 @@ class Crossing:
     z: complex
     """The pole on the circle, or the one that has jumped out of it; of a pair the upper one."""
     frequency: float
-    """Its frequency [rad/s], up to whole turns in a period: 0 of a pole at 1, half the sampling rate of one at -1."""
+    """Its frequency [rad/s]: 0 of a pole at 1, half the sampling rate of one at -1."""
+    turn: float | None = None
+    """Whole turns in the common period of several rates [rad/s]: by multiples of it the frequency may be another; None:
+    one rate"""
     accuracy: float | None = None
     """Error of the value, as pulses of another size show; None: not known, or poles jump"""
 
@@ -146,7 +150,8 @@ class RootLocus:
         """Where poles cross, in words: at a value, with the frequency, or between two where rates repeat together."""
         ends = [quantity(value, self.unit, crossing.digits) for value in sorted((crossing.value, crossing.until))]
         jumps = ends[0] != ends[1] and not math.isclose(crossing.value, crossing.until, abs_tol=ALIKE)
-        return f"between {' and '.join(ends)}" if jumps else f"at {ends[0]}, {crossing.frequency:.4g} rad/s"
+        turns = f" or an alias by {crossing.turn:.4g} rad/s" if crossing.turn else ""
+        return f"between {' and '.join(ends)}" if jumps else f"at {ends[0]}, {crossing.frequency:.4g} rad/s{turns}"
 
     def pole_of(self, crossing: Crossing) -> str:
         """The pole on the circle, in words; of those that jump one outside, with its size and the value it is of."""
@@ -272,7 +277,9 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
             poles, period = found[outside]
             pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
             frequency = abs(math.atan2(pole.imag, pole.real)) / period
-            one = Crossing(value=inside, until=outside, leaves=leaves, z=pole, frequency=frequency)
+            shortest = float(min(periods_of(at(outside)))) / NANOSECONDS
+            turn = 2.0 * math.pi / period if period > 1.5 * shortest else None
+            one = Crossing(value=inside, until=outside, leaves=leaves, z=pole, frequency=frequency, turn=turn)
             return one if one.jumps else replace(one, accuracy=accuracy_of(one))
 
         def accuracy_of(one: Crossing) -> float | None:

@@ -123,6 +123,7 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
     limit = about_rest(
         lambda value: changed(both, {period: value}), Range(first=0.008, step=0.016, last=0.024, tolerance=1.0)
     )
+    assert crossing.turn == pytest.approx(2e9 * np.pi / float(of_all))
     assert (limit.limit, limit.accuracy) == pytest.approx((crossing.value + 0.0002, 0.0002), rel=1e-6)
     assert per_longest == pytest.approx(after ** (1e9 * max(crossing.until, 0.008) / float(of_all)), rel=1e-6)
 
@@ -139,7 +140,7 @@ def test_over_decades_the_own_value_is_tried_and_crossings_are_at_the_gain_margi
     assert (found.own, found.geometric) == (0.96, True)
     margins = bode(example("dc_servo")).loops[0].gain_margins
     assert [one.value for one in found.crossings] == pytest.approx([0.96 * one.factor for one in margins], rel=1e-5)
-    assert [one.leaves for one in found.crossings] == [False, True]
+    assert [(one.leaves, one.turn) for one in found.crossings] == [(False, None), (True, None)]
     assert all(one.accuracy is not None and one.accuracy < 1e-5 for one in found.crossings)
     even = locus(example("dc_servo"), "components.controller.parameters.K", first=2.0, last=20.0, count=3)
     assert (even.values.tolist(), even.own, even.geometric) == ([2.0, 11.0, 20.0], None, False)
