@@ -27,7 +27,7 @@ QUANTITIES = (PERIOD, "delay", "jitter", "loss")
 STEPS, PARTS = 20, 50
 """Number of steps of the scan of a given range, and of tolerances in a step"""
 PER_DECADE, SHARE = 5, 0.01
-"""Of a range by equal factors: steps in a decade, at least, and the tolerance as a share of the value"""
+"""Steps in a decade, at least, of a range by equal factors, and the tolerance there, as a share of the value"""
 OWN = 0.2
 """Share of the file's own delay that is the unit of its range where it is more than a period"""
 

@@ -59,7 +59,7 @@ class Linear:
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
     start: Start | None
-    """Where it has come to rest; None: its operating point is at rest at once"""
+    """Begin, where the system has come to rest; None: its operating point is at rest at once"""
     initial: InitialState | None = None
     """None: not requested"""
 
