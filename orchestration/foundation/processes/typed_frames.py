@@ -177,7 +177,8 @@ def _float(data: bytes, depth: int) -> float:
     cls: Any = PASSABLE.get(expect(name, str), object)
     if not issubclass(cls, float):
         raise FrameError("expected a class of floats that there is")
-    return cls(expect(value, float))
+    made: float = cls(expect(value, float))
+    return made
 
 
 def _error(data: bytes, depth: int) -> BaseException:
