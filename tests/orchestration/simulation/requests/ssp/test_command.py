@@ -190,7 +190,11 @@ UNCONNECTED = "expected a parameter, an input that nothing is connected to"
     ("name", "value", "message"),
     [
         ("plant.mas", 1.0, "QuadrotorPlant has no such variable; did you mean mass?"),
-        ("controller.gain", 1.0, "UnifiedController has no such variable; did you mean gain.eta?"),
+        (
+            "controller.gain",
+            1.0,
+            "UnifiedController has no such variable; did you mean gain.eta or gain.theta or gain.surface?",
+        ),
         ("plant.thrust", 1.0, f"is connected; {UNCONNECTED}"),
         ("controller.position.x", 1.0, f"is connected; {UNCONNECTED}"),
         ("plant.position.x", 1.0, f"is an output; {UNCONNECTED}"),
