@@ -240,7 +240,7 @@ def shares_as_text(limit: Limit) -> list[list[str]]:
 def _mean_square_note(found: LinearLimit, span: Range) -> list[str]:
     """The note on the mean-square limit."""
     if found.limit is not None:
-        return [f"from {span.text(found.limit)} on means of squares have no finite expectation"]
+        return [f"just above {span.text(found.limit)} means of squares have no finite expectation"]
     return [found.reason] if found.reason else []
 
 

@@ -53,8 +53,8 @@ class Limit:
     local_lower_limit: float | None = None
     """The value below which, down from the system's own, small errors do not decay either; None: none was found."""
     mean_square_limit: float | None = None
-    """The value from which mean squares of the loop about its operating point have no finite expectation; None: nothing
-    is random, or there is no such value in the range, or it cannot be determined."""
+    """The value just above which mean squares of the loop about its operating point have no finite expectation, as they
+    may have again further above; None: nothing is random, or there is none in the range, or it is not known."""
     large_signal_limit: float | None
     """The last value that is good from the scenario's own initial state; None: no value in the range failed, or the
     first did."""
