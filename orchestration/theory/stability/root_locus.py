@@ -39,7 +39,7 @@ from orchestration.theory.stability.operating_point import (
 )
 from orchestration.theory.stability.period_map import OTHER_PULSE, growth_of_loop, period_map
 from orchestration.theory.stability.poles import Complexes, in_words, poles_of
-from orchestration.theory.stability.several_rates import commensurate, narrowed
+from orchestration.theory.stability.several_rates import Commensurate, commensurate, narrowed
 from orchestration.theory.stability.sign_changes import short, uncertainty, zero_between
 
 if TYPE_CHECKING:
@@ -209,122 +209,142 @@ def _spaced(span: Range, count: int, spaced: Callable[[float, float, int], Float
     return [short(float(value), span.unit) for value in spaced(span.values()[0], span.last, count)]
 
 
+class _Tried:
+    """The poles of a loop at values of a quantity, each measured once, and where they cross the unit circle."""
+
+    def __init__(self, varied: Varied, system: System, instances: Instances, unit: str | None) -> None:
+        self._varied, self._system, self._instances, self._unit = varied, system, instances, unit
+        self.known, self._starts = KnownTangents(), dict[float, Start | None]()
+        self.rates: Commensurate | None = None
+        """Values at which all rates meet; None: one rate"""
+        self.found: dict[float, tuple[Complexes, float]] = {}
+        """Poles by value, and the period [s] that they are over"""
+        self.without: dict[float, UsageError] = {}
+        """Why values have none"""
+        with suppress(UsageError):  # of one that is unstable, values from which it is stable may follow
+            keep_start(system, instances, self.known)
+
+    def at(self, value: float) -> System:
+        """The system at a value."""
+        return changed(self._system, dict.fromkeys(self._varied.paths, value))
+
+    def radius(self, value: float) -> float:
+        """The spectral radius, among several rates per longest period; raises `UsageError` where there are no poles."""
+        if value not in self.found:
+            self._measure(value)
+        poles, period = self.found[value]
+        share = 1.0 if self.rates is None else float(longest_period(self.at(value))) / NANOSECONDS / period
+        return float(np.abs(poles).max(initial=0.0) ** share)
+
+    def _measure(self, value: float) -> None:
+        try:
+            if self._starts:
+                self.known.start = self._starts[min(self._starts, key=lambda one: abs(one - value))]
+            with whole_at_rest(self.at(value), self._instances, known=self.known) as loop:
+                self.found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
+        except UsageError as error:
+            raise type(error)(f"{self._varied.of} = {value:g}: {error}") from None
+        self._starts[value] = self.known.start
+
+    def has_poles(self, value: float) -> bool:
+        """Whether there are poles at a value; else `without` has the reason."""
+        try:
+            self.radius(value)
+        except UsageError as error:
+            self.without[value] = error
+            return False
+        self.without.pop(value, None)
+        return True
+
+    def crossing(self, below: float, above: float) -> Crossing | None:
+        """Where poles cross between two values; None: they do not, or one of these has none."""
+        if not {below, above} <= self.found.keys() or (self.radius(below) < 1.0) == (self.radius(above) < 1.0):
+            return None
+        inside, outside = sorted((below, above), key=self.radius)
+        if self.rates is not None:
+            narrowed(lambda value: self.radius(value) >= 1.0, Bracket(inside, outside), self.rates)
+        else:
+            ends = ((below, self.radius(below) - 1.0), (above, self.radius(above) - 1.0))
+            inside, outside = zero_between(
+                lambda value: self.radius(value) - 1.0, lambda x: short(x, self._unit), *ends
+            )
+        poles, period = self.found[outside]
+        pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
+        shortest = float(min(periods_of(self.at(outside)))) / NANOSECONDS
+        one = Crossing(
+            value=inside, until=outside, leaves=self.radius(below) < 1.0, z=pole,
+            frequency=abs(math.atan2(pole.imag, pole.real)) / period,
+            turn=2.0 * math.pi / period if period > 1.5 * shortest else None,
+        )  # fmt: skip
+        return one if one.jumps else replace(one, accuracy=self._accuracy_of(one))
+
+    def _accuracy_of(self, one: Crossing) -> float | None:
+        growths = {value: math.log(max(self.radius(value), ROUNDING)) / self.found[value][1] for value in self.found}
+        growth = growths[one.until]
+        try:
+            error = abs(growth_of_loop(self.at(one.until), self._instances, OTHER_PULSE, self.known) - growth)
+        except UsageError:
+            return None
+        accuracy = uncertainty(growths, one.value, error + abs(growth)) + abs(one.until - one.value)
+        return accuracy if math.isfinite(accuracy) else None
+
+
+def _crossings(loop: _Tried, tried: list[float], own: float | None) -> list[Crossing]:
+    """Where poles cross, in rising order; raises `UsageError` where no value has poles."""
+    crossings = list[Crossing | None]()
+    with progress_bar("poles") as report:
+        # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
+        first = (tried[-1], own if own in tried else tried[0], tried[0])
+        if not (any(map(loop.has_poles, first)) or isinstance(loop.without[tried[0]], NotAnEquilibriumError)):
+            raise loop.without[tried[-1]]
+        for place in range(len(tried) - 2, -1, -1):
+            loop.has_poles(tried[place])
+            report(1.0 - place / len(tried))
+            crossings.append(loop.crossing(tried[place], tried[place + 1]))
+        if not loop.found:
+            raise loop.without[tried[-1]]
+        for below, value, above in zip(tried, tried[1:], [*tried[2:], math.nan]):  # near a rest that is known now
+            if below in loop.found and value in loop.without and loop.has_poles(value):
+                crossings += [loop.crossing(below, value), loop.crossing(value, above)]
+        known_before = 0
+        while loop.rates is not None and known_before < len(loop.found):  # narrowing may have found others between
+            known_before = len(loop.found)
+            crossings = [loop.crossing(*pair) for pair in pairwise(sorted(loop.found.keys() | loop.without.keys()))]
+    return sorted((one for one in crossings if one is not None), key=lambda one: one.value)
+
+
 def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
     with errors_in_own_terms(varied.request), closing(Instances()) as instances:
-        unit, own, system, known = span.unit, span.own, rested(varied.request), KnownTangents()
-        with suppress(UsageError):  # of one that is unstable, values from which it is stable may follow
-            keep_start(system, instances, known)
-        found: dict[float, tuple[Complexes, float]] = {}
-
-        def at(value: float) -> System:
-            return changed(system, dict.fromkeys(varied.paths, value))
+        own, system = span.own, rested(varied.request)
+        loop = _Tried(varied, system, instances, span.unit)
 
         def with_own(values: list[float]) -> list[float]:
             if own is None or not values[0] < own < values[-1]:
                 return values
             return sorted([own, *(value for value in values if not math.isclose(value, own))])
 
-        rates = commensurate(at, with_own(span.values() if count is None else _spaced(span, count, np.linspace)))
-        geometric = rates is None and is_wide(span.values()[0], span.last)
+        every = with_own(span.values() if count is None else _spaced(span, count, np.linspace))
+        loop.rates = commensurate(loop.at, every)
+        geometric = loop.rates is None and is_wide(span.values()[0], span.last)
         spaced = _spaced(span, count or COUNT, np.geomspace if geometric else np.linspace)
-        values = with_own(spaced) if rates is None else rates.scan
+        values = with_own(spaced) if loop.rates is None else loop.rates.scan
         if not values:
             raise UsageError(f"{varied.of}: several rates, which repeat together at no value of the range")
-
-        def radius_of(value: float) -> float:
-            poles, period = found[value]
-            share = 1.0 if rates is None else float(longest_period(at(value))) / NANOSECONDS / period
-            return float(np.abs(poles).max(initial=0.0) ** share)
-
-        def radius(value: float) -> float:
-            if value in found:
-                return radius_of(value)
-            try:
-                if starts:
-                    known.start = starts[min(starts, key=lambda one: abs(one - value))]
-                with whole_at_rest(at(value), instances, known=known) as loop:
-                    found[value] = poles_of(period_map(loop)), float(loop.period) / NANOSECONDS
-            except UsageError as error:
-                raise type(error)(f"{varied.of} = {value:g}: {error}") from None
-            starts[value] = known.start
-            return radius_of(value)
-
-        starts, without = dict[float, Start | None](), dict[float, UsageError]()
-
-        def has_poles(value: float) -> bool:
-            try:
-                radius(value)
-            except UsageError as error:
-                without[value] = error
-                return False
-            without.pop(value, None)
-            return True
-
-        tried, crossings = _beside_jumps(varied, system, values), list[Crossing]()
-
-        def cross(below: float, above: float) -> None:
-            if not {below, above} <= found.keys() or (radius(below) < 1.0) == (radius(above) < 1.0):
-                return
-            inside, outside = sorted((below, above), key=radius)
-            if rates is not None:
-                narrowed(lambda value: radius(value) >= 1.0, Bracket(inside, outside), rates)
-            else:
-                ends = ((below, radius(below) - 1.0), (above, radius(above) - 1.0))
-                inside, outside = zero_between(lambda value: radius(value) - 1.0, lambda x: short(x, unit), *ends)
-            crossings.append(crossing(inside, outside, leaves=radius(below) < 1.0))
-
-        def crossing(inside: float, outside: float, *, leaves: bool) -> Crossing:
-            poles, period = found[outside]
-            pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
-            frequency = abs(math.atan2(pole.imag, pole.real)) / period
-            shortest = float(min(periods_of(at(outside)))) / NANOSECONDS
-            turn = 2.0 * math.pi / period if period > 1.5 * shortest else None
-            one = Crossing(value=inside, until=outside, leaves=leaves, z=pole, frequency=frequency, turn=turn)
-            return one if one.jumps else replace(one, accuracy=accuracy_of(one))
-
-        def accuracy_of(one: Crossing) -> float | None:
-            growths = {value: math.log(max(radius(value), ROUNDING)) / found[value][1] for value in found}
-            growth = growths[one.until]
-            try:
-                error = abs(growth_of_loop(at(one.until), instances, OTHER_PULSE, known) - growth)
-            except UsageError:
-                return None
-            accuracy = uncertainty(growths, one.value, error + abs(growth)) + abs(one.until - one.value)
-            return accuracy if math.isfinite(accuracy) else None
-
-        with progress_bar("poles") as report:
-            # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
-            first = (tried[-1], own if own in tried else tried[0], tried[0])
-            if not (any(map(has_poles, first)) or isinstance(without[tried[0]], NotAnEquilibriumError)):
-                raise without[tried[-1]]
-            for place in range(len(tried) - 2, -1, -1):
-                has_poles(tried[place])
-                report(1.0 - place / len(tried))
-                cross(tried[place], tried[place + 1])
-            if not found:
-                raise without[tried[-1]]
-            for below, value, above in zip(tried, tried[1:], [*tried[2:], math.nan]):  # near a rest that is known now
-                if below in found and value in without and has_poles(value):
-                    cross(below, value)
-                    cross(value, above)
-            known_before = 0
-            while rates is not None and known_before < len(found):  # narrowing may have found others between
-                known_before = len(found)
-                crossings.clear()
-                for below, above in pairwise(sorted(found.keys() | without.keys())):
-                    cross(below, above)
-    refused, values = [value for value in values if value in without], [value for value in values if value in found]
-    each = [found[value][0] for value in values]
+        crossings = _crossings(loop, _beside_jumps(varied, system, values), own)
+    refused = [value for value in values if value in loop.without]
+    values = [value for value in values if value in loop.found]
+    each = [loop.found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
     for row, known_poles in zip(poles, each, strict=True):
         row[: len(known_poles)] = known_poles
-    curve = np.array([(x, radius_of(x) if x in found else math.nan) for x in sorted(found.keys() | without.keys())]).T
+    tried = sorted(loop.found.keys() | loop.without.keys())
     return RootLocus(
-        of=varied.of, unit=unit, own=own if own in values else None, values=np.array(values),
-        radius=np.array([radius_of(value) for value in values]), geometric=geometric, poles=poles,
-        crossings=tuple(sorted(crossings, key=lambda one: one.value)), curve=curve,
-        in_double=are_in_double({name: one for name, (one, _, _) in known.items()}),
-        without=tuple(str(without[value]) for value in refused),
+        of=varied.of, unit=span.unit, own=own if own in values else None, values=np.array(values),
+        radius=np.array([loop.radius(value) for value in values]), geometric=geometric, poles=poles,
+        crossings=tuple(crossings),
+        curve=np.array([(x, loop.radius(x) if x in loop.found else math.nan) for x in tried]).T,
+        in_double=are_in_double({name: one for name, (one, _, _) in loop.known.items()}),
+        without=tuple(str(loop.without[value]) for value in refused),
     )  # fmt: skip
 
 
