@@ -1,5 +1,6 @@
 """An .fmu of this kit as an archive: the paths in it, the metadata that it carries, and writing it."""
 
+import functools
 import hashlib
 import json
 import re
@@ -31,31 +32,41 @@ _STAMP = (1980, 1, 1, 0, 0, 0)
 
 def read_source_hash(fmu: Path) -> str | None:
     """The source hash stored in an .fmu; None if it was not made by this kit or is not readable."""
-    try:
-        with zipfile.ZipFile(fmu) as archive:
-            return archive.read(SOURCE_HASH_FILE).decode().strip()
-    except (OSError, KeyError, zipfile.BadZipFile):
-        return None
+    found = _stored(fmu, SOURCE_HASH_FILE)
+    return None if found is None else found.decode().strip()
 
 
 def read_variant(fmu: Path) -> tuple[str, Variant] | None:
     """The slave, as `module:Class`, and the variant of it that an .fmu is; None if it is none or not readable."""
     try:
-        with zipfile.ZipFile(fmu) as archive:
-            slave, text = json.loads(archive.read(VARIANT_FILE))
-            return str(slave), Variant.parse(text)
-    except (OSError, KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile):
+        slave, text = json.loads(_stored(fmu, VARIANT_FILE) or "")
+        return str(slave), Variant.parse(text)
+    except (TypeError, ValueError, AttributeError):
         return None
 
 
 def read_wrapped(fmu: Path) -> dict[str, Any] | None:
     """What the FMU of a user's own C states of its origin; None if it is none or not readable."""
     try:
-        with zipfile.ZipFile(fmu) as archive:
-            found = json.loads(archive.read(WRAPPED_FILE))
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        found = json.loads(_stored(fmu, WRAPPED_FILE) or "")
+    except ValueError:
         return None
     return found if isinstance(found, dict) else None
+
+
+def _stored(fmu: Path, name: str) -> bytes | None:
+    """A file of an archive, read once while that stays the same; None if it has none or is not readable."""
+    try:
+        about = fmu.stat()
+        return _content(fmu, name, (about.st_ino, about.st_mtime_ns, about.st_ctime_ns, about.st_size))
+    except (OSError, zipfile.BadZipFile):
+        return None
+
+
+@functools.lru_cache(maxsize=256)
+def _content(fmu: Path, name: str, _: tuple[int, ...]) -> bytes | None:
+    with zipfile.ZipFile(fmu) as archive:
+        return archive.read(name) if name in archive.NameToInfo else None
 
 
 def content_guid(files: dict[str, bytes]) -> str:

@@ -187,7 +187,7 @@ class Model:
         """Of FMI: 1, 2 or 3."""
         return int(self.description.fmiMajorVersion)
 
-    @property
+    @cached_property
     def capabilities(self) -> Any:
         """What it declares of the interface by which it is called."""
         return declared_of(self.description)[self.interface]
@@ -202,7 +202,7 @@ class Model:
         """Whether it supports communication steps of any length."""
         return bool(getattr(self.capabilities, "canHandleVariableCommunicationStepSize", True))
 
-    @property
+    @cached_property
     def saves_state(self) -> bool:
         """Whether its state can be saved as bytes and restored."""
         return bool(self.capabilities.canGetAndSetFMUstate and self.capabilities.canSerializeFMUstate)

@@ -11,7 +11,7 @@ import numpy as np
 from fmu_kit.scalar import ScalarOps
 from fmu_kit.trajectory import Trajectory
 from orchestration.foundation.basics.simulator import Floats, Transfer
-from orchestration.foundation.basics.times import NANOSECONDS, Grid, exact_nanoseconds
+from orchestration.foundation.basics.times import NANOSECONDS, Grid, exact_nanoseconds, instants_of
 from orchestration.systems.signals.dryden import DRAWS, Dryden
 
 if TYPE_CHECKING:
@@ -200,19 +200,23 @@ class WhiteNoise:
 
     def at(self, t: float) -> Sequence[float]:
         """The values held at `t` [s]."""
-        values: list[float] = self._upto(self._index(t))[self._index(t)].tolist()
+        index = self._index(round(t * NANOSECONDS))
+        values: list[float] = self._upto(index)[index].tolist()
         return values
 
     def over(self, t: Floats) -> Floats:
         """The values held at times `t`."""
-        indices = np.array([self._index(time) for time in t.tolist()])
+        times = instants_of(t)
+        if self._period.denominator == 1:  # all at once
+            indices = times // self._period.numerator
+        else:
+            indices = np.array([self._index(time) for time in times.tolist()])
         result: Floats = self._upto(int(indices.max()))[indices]
         return result
 
     at_each = over
 
-    def _index(self, t: float) -> int:
-        time = round(t * NANOSECONDS)
+    def _index(self, time: int) -> int:
         k = time * self._period.denominator // self._period.numerator
         return k + (self._grid[k + 1] <= time)
 
