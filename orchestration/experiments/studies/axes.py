@@ -79,6 +79,12 @@ class Axis:
             return math.exp(math.log(self.low) + share * math.log(self.high / self.low))
         return self.low + share * (self.high - self.low)
 
+    def share(self, value: float) -> float | None:
+        """The share of the range at which a value lies, in [0, 1] if within; None: on no logarithmic scale."""
+        if self.scale == "logarithmic":
+            return math.log(value / self.low) / math.log(self.high / self.low) if value > 0.0 else None
+        return (value - self.low) / (self.high - self.low)
+
     def at_each(self, shares: Floats) -> list[Value]:
         """The values at many shares."""
         if self.scale == "logarithmic":  # NumPy's exponential function has other last bits

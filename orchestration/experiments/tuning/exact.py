@@ -106,6 +106,8 @@ def search_exactly(
         seed=seed,
         values=tuning.values(best.shares.tolist()),
         cost=math.inf if cost is None else cost,
+        own_cost=math.inf if best.own_cost is not None and best.own_cost >= UNSTABLE else best.own_cost,
+        of_ranges=tuning.of_ranges(best.shares.tolist()),
         evaluations=best.evaluations,
         note=f"{without} of {len(tried)} candidates had no expectation, the first, {told()}" if without else "",
         mean_square_radius=expectation.mean_square_radius,

@@ -52,9 +52,10 @@ class Tuned:
 
     @property
     def verdict(self) -> str:
-        """The lowest cost for each period."""
+        """The lowest cost for each period, beside that of the file's own values."""
         costs = [
-            f"{'own periods' if period is None else quantity(period, 's')} cost {one.cost:.4g}, {one.judgement}"
+            f"{'own periods' if period is None else quantity(period, 's')} "
+            + "; ".join(filter(None, [one.compared, one.of_ranges, one.judgement]))
             for period, one in self.best.items()
         ]
         return f"best of {len(self.searches)} searches: {some(costs, '; ')}"

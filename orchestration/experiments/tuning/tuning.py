@@ -149,6 +149,8 @@ def search(
         seed=seed,
         values=values,
         cost=best.cost,
+        own_cost=best.own_cost,
+        of_ranges=tuning.of_ranges(best.shares.tolist()),
         evaluations=best.evaluations,
         judged=len(judged),
         survives=sum(map(survives, judged)),

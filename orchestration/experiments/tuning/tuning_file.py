@@ -119,7 +119,8 @@ def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[
         *more,
         f"The loop is {'; '.join([describe_clock(system), *faults])}. By {software}.",
         *tuning.warnings(best.period),
-        f"Of {len(others)} searches that of seed {best.seed} is taken: it costs least on these, {best.cost:.5g}.",
+        f"Of {len(others)} searches that of seed {best.seed} is taken, of least {best.compared}.",
+        *([f"{best.of_ranges}."] if best.of_ranges else []),
         *(f"Seed {one.seed}: {one.judgement}." for one in others),
     ]
     document: dict[str, Any] = {}

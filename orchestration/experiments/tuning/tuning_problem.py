@@ -8,11 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from orchestration.experiments.studies.axes import Axis
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, did_you_mean, listed, prefixed
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.engines.resolved import periods_in_words
-from orchestration.simulation.requests.ranges import Varied, default_quantity, paths_in
+from orchestration.simulation.requests.ranges import Varied, default_quantity, own_value, paths_in
+from orchestration.systems.expressions.over_run import STOP_TIME, TIME
+from orchestration.systems.expressions.syntax import names, parse
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -20,8 +22,10 @@ from orchestration.systems.system.request import Request, errors_in_own_terms, s
 
 Costs = Callable[[Sequence[Floats]], Sequence[float]]
 """The costs of points of the unit cube"""
-COST = "cost"
-"""Name of the objective that a tuning adds"""
+COST = "cost.of"
+"""Name of the objective that a tuning adds: the key of its file"""
+AT_BOUND = 0.005
+"""Share of a range that counts as its bound"""
 _WIDTH = 0.25
 """Standard deviation of the first generation, as a share of each range"""
 
@@ -54,8 +58,12 @@ class TuningProblem:
         for name in ("periods", "seeds"):
             if getattr(self, name) == ():
                 raise UsageError(f"{name}: expected at least one")
-        if COST in self.origin.objectives:
-            raise UsageError(f"objectives.{COST}: expected another name, which a tuning adds")
+        known = list(self.origin.objectives)
+        with prefixed(f"{COST}: "):
+            for name in names(parse(self.cost)):
+                if "." not in name and name not in (*known, TIME, STOP_TIME):
+                    closest = did_you_mean(name, known) or ";"
+                    raise UsageError(f"there is no objective {name}{closest} expected one of {listed(known)}")
         assert self._paths
         if self.periods is not None:
             assert self._period_paths
@@ -78,6 +86,19 @@ class TuningProblem:
                 "search.periods: expected a base with one period, of its only sampled component; leave out "
                 "search.periods to keep the periods of the file"
             ) from None
+
+    @cached_property
+    def own(self) -> list[float | None]:
+        """The values of the base as shares of the ranges, in [0, 1] if within; None: none there, or several."""
+        models = self.files().models_of(self.origin)
+
+        def share(axis: Axis) -> float | None:
+            paths = [path for target in axis.targets for path in self._paths[target]]
+            values = {own_value(Varied(request=self.origin, of=path), models) for path in paths}
+            (value, *others) = values
+            return None if others or value is None else axis.share(value)
+
+        return [share(axis) for axis in self.parameters]
 
     @property
     def searched_periods(self) -> tuple[float | None, ...]:
@@ -123,6 +144,18 @@ class TuningProblem:
         """The parameters there by name, in words."""
         return ", ".join(f"{axis.name} = {axis.at(float(share)):.4g}" for axis, share in zip(self.parameters, shares))
 
+    def of_ranges(self, shares: Sequence[float]) -> str:
+        """The parameters that the ranges cut off, there and in the base, in words; empty: none."""
+        cut = []
+        for axis, share, own in zip(self.parameters, shares, self.own):
+            if end := "lower" if share <= AT_BOUND else "upper" if share >= 1.0 - AT_BOUND else "":
+                cut.append(f"{axis.name} = {axis.at(share):.4g} lies on the {end} bound of its range: widen it")
+            if own is None:
+                cut.append(f"the file has no single number for {axis.name}, so its own values are not compared")
+            elif not 0.0 <= own <= 1.0:
+                cut.append(f"the file's own {axis.name} = {axis.at(own):.4g} lies outside of its range")
+        return "; ".join(cut)
+
     def system(self, period: float | None, values: Mapping[str, float]) -> System:
         """The system with a period and values of the targets; raises `UsageError` for an invalid value."""
         changes = {path: value for target, value in values.items() for path in self._paths[target]}
@@ -150,6 +183,10 @@ class SearchResult:
     cost: float
     """Cost of these values, as minimised"""
     evaluations: int
+    own_cost: float | None
+    """Cost of the values of the file; None: they are not compared"""
+    of_ranges: str
+    """Parameters that the ranges cut off, in words; empty: none"""
     note: str = ""
     """Failures of candidates on the way, in one line; empty: none"""
 
@@ -157,6 +194,16 @@ class SearchResult:
     def place(self) -> str:
         """The period, in words."""
         return "own periods" if self.period is None else f"period {self.period:g} s"
+
+    @property
+    def compared(self) -> str:
+        """The cost beside that of the file's own values, in words."""
+        if self.own_cost is None:
+            return f"cost {self.cost:.4g}"
+        if math.isclose(self.cost, self.own_cost, rel_tol=1e-9):
+            return f"cost {self.cost:.4g}, that of the file's own values: none costs less"
+        ratio = f"{self.cost / self.own_cost:.3g} times " if 0.0 < self.own_cost < math.inf else "where it is "
+        return f"cost {self.cost:.4g}, {ratio}{self.own_cost:.4g} with the file's own values"
 
     @property
     def judgement(self) -> str:
@@ -175,6 +222,8 @@ class Minimum:
 
     shares: Floats
     cost: float
+    own_cost: float | None
+    """of the base, None where its values are no point of the cube"""
     evaluations: int
 
 
@@ -186,7 +235,8 @@ def minimise(
 ) -> Minimum:
     """The best point of one search by CMA-ES (Hansen, arXiv:1604.00772), which starts at a point drawn by the seed.
 
-    `costs` gives the costs of points of the unit cube, a generation at a time.
+    The values of the base are a point of the first generation, or beside it if the ranges are without them. `costs`
+    gives the costs of points of the unit cube, a generation at a time.
     """
     import cma  # deferred: it imports matplotlib
 
@@ -194,18 +244,28 @@ def minimise(
     first = np.random.default_rng(seed).uniform(0.25, 0.75, max(size, 2))  # a second one without effect: cma needs two
     options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9, "popsize": tuning.generation}
     strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
-    best, least, count = first[:size], np.inf, 0
+    best, least, count, own_cost = first[:size], np.inf, 0, None
+    own: Floats | None = None if None in tuning.own else np.array(tuning.own, dtype=float)
+    within = own is not None and bool(((own >= 0.0) & (own <= 1.0)).all())
+    if own is not None and within:
+        point = strategy.gp.geno([*own, *first[size:]], strategy.boundary_handler.inverse)
+        strategy.inject([point], force=True)
     while count < tuning.budget:  # no other stopping rule: every controller gets the same effort
         asked = strategy.ask()
         candidates = [np.asarray(candidate)[:size] for candidate in asked]
+        if count == 0 and own is not None:
+            candidates = [own, *candidates[1:]] if within else [*candidates, own]
         values = costs(candidates)
+        if count == 0 and own is not None:
+            own_cost = float(values[0 if within else -1])
+        values = values[: len(asked)]
         strategy.tell(asked, values)
-        count += len(candidates)
+        count += len(asked)
         place = int(np.argmin(values))
         if values[place] < least:
             best, least = candidates[place], values[place]
         progress(count / tuning.budget)
-    return Minimum(shares=best, cost=float(least), evaluations=count)
+    return Minimum(shares=best, cost=float(least), own_cost=own_cost, evaluations=count)
 
 
 def best_by_period(results: Sequence[SearchResult]) -> Iterator[SearchResult]:

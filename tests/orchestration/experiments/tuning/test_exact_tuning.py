@@ -113,6 +113,43 @@ def test_a_cost_is_that_of_what_runs_print_if_so_requested(tmp_path: Path, monke
     assert tuned(tuning(evaluations=3), tmp_path).searches[0].cost == 2.0
 
 
+def test_a_search_begins_with_the_values_of_the_file_and_says_what_they_cost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def narrow(system: System, loops: Loops, flown: bool) -> Expected:
+        """The least cost at the gains of the file, between which and all others it is higher."""
+        K, Td = (float(system.components["controller"].parameters[name]) for name in ("K", "Td"))
+        return replace(EXPECTED, objectives={COST: 2.0 if math.hypot(K - 1.5, Td - 0.035) < 1e-9 else 3.0 + K})
+
+    monkeypatch.setattr(exact, "expected_of", narrow)
+    kept = tuned(tuning(evaluations=3), tmp_path)
+    (one,) = kept.searches
+    assert one.values == {f"{GAINS}.K": pytest.approx(1.5), f"{GAINS}.Td": pytest.approx(0.035)}
+    assert "6 ms cost 2, that of the file's own values: none costs less; the mean-" in kept.verdict
+
+    off, Td = Axis(name="K", targets=(f"{GAINS}.K",), low=2.0, high=3.0), tuning().parameters[1]
+    other = tuned(tuning(parameters=(off, Td), evaluations=40, name="off"), tmp_path)
+    assert "6 ms cost 5, 2.5 times 2 with the file's own values; K = 2 lies on the lower bound of its" in other.verdict
+    assert "widen it; the file's own K = 1.5 lies outside of its range; the mean-" in other.verdict
+    text = other.written[0].read_text()
+    assert "of least cost 5, 2.5 times 2 with the file's own values.\n# K = 2 lies on the lower bound" in text
+
+    several = tuning(
+        parameters=(replace(tuning().parameters[0], targets=(f"{GAINS}.K", f"{GAINS}.Td")),), name="several"
+    )
+    found = tuned(replace(several, evaluations=6), tmp_path)
+    assert found.searches[0].own_cost is None
+    assert "the file has no single number for K, so its own values are not compared" in found.verdict
+
+
+def test_the_cost_may_be_an_objective_of_any_name() -> None:
+    base = fmus.native_twins(load_tuning(FILE).origin)
+    named = replace(base, objectives={**base.objectives, "cost": "2 * J"})
+    assert tuning(base=named, cost="cost").system(0.006, {}).objectives[COST] == "cost"
+    with pytest.raises(UsageError, match=r"^cost\.of: there is no objective costs; .*cost\? expected one of J, cost$"):
+        tuning(base=named, cost="2 * costs")
+
+
 @pytest.mark.parametrize(
     ("before", "after", "named"),
     [

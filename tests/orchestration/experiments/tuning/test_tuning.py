@@ -12,7 +12,7 @@ from orchestration.experiments.tuning import tune as tunes
 from orchestration.experiments.tuning.tune import run_searches, write
 from orchestration.experiments.tuning.tuning import Tuning, TuningResult, search
 from orchestration.experiments.tuning.tuning_file import load_tuning
-from orchestration.experiments.tuning.tuning_problem import best_by_period, minimise
+from orchestration.experiments.tuning.tuning_problem import COST, best_by_period, minimise
 from orchestration.foundation.basics.documents import read_toml
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.simulation.engines.batch import shape
@@ -41,7 +41,7 @@ def bowl(systems):
     for system in systems:
         attitude, surface = (value_at(system, f"{GAINS}.{name}") for name in ("attitude", "surface"))
         cost = 1.0 + math.log(attitude / 10.0) ** 2 + (surface - 5.0) ** 2
-        metrics.append({"cost": cost, "good": cost < 50.0, "diverged": cost > 60.0})
+        metrics.append({COST: cost, "good": cost < 50.0, "diverged": cost > 60.0})
     return metrics
 
 
@@ -61,7 +61,7 @@ def test_searches_are_reproducible_and_depend_on_the_seed(tuning):
 
 
 def run(cost, *, good=True, diverged=False):
-    return {"cost": cost, "good": good, "diverged": diverged}
+    return {COST: cost, "good": good, "diverged": diverged}
 
 
 def test_a_run_that_diverges_has_the_stated_cost_which_also_bounds_that_of_others(tuning):
