@@ -48,9 +48,8 @@ def of(system: System, **how: Any) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(
-    "how", [{}, {"as_simulated": True}, {"horizon": 7.3}], ids=["means", "as simulated", "horizon"]
+    ("execution", "how"), [(0.0, {}), (0.1, {}), (0.1, {"as_simulated": True}), (0.4, {"horizon": 7.3})], ids=str
 )
-@pytest.mark.parametrize("execution", sample([0.0, 0.1, 0.4], 2))
 def test_one_task_alone_costs_what_a_delay_of_its_execution_does(execution: float, how: dict[str, Any]) -> None:
     by_delay = example("minimum_variance", {DELAY: execution})
     by_task = on_a_computer("minimum_variance", period=1.0, execution=execution)

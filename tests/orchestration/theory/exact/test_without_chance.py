@@ -8,7 +8,7 @@ import pytest
 from orchestration.components.fmi.reuse import Instances
 from orchestration.theory.exact.expect import expect
 from orchestration.theory.stability.period_map import growth_of_loop
-from tests.examples.common import example
+from tests.examples.common import native_example as example
 from tests.extent import sample
 
 PERIOD, DELAY = "components.controller.sampling.period", "connections.command.delay"

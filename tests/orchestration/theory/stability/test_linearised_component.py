@@ -112,19 +112,21 @@ class Levitated(Line):
     def __init__(self) -> None:
         self.kept, self.u = np.array([self.CURRENT, 0.0, 0.01]), self.VOLTAGE
 
-    def rate(self, x: Floats) -> Floats:
-        current, speed, gap = x
+    def later(self, h: float, rate: tuple[float, ...] = (0.0, 0.0, 0.0)) -> tuple[float, ...]:
+        """The rates after `h` at a constant rate."""
+        current, speed, gap = (value + h * each for value, each in zip(self.kept.tolist(), rate))
         pull = 7e-5 * (current / gap) ** 2 / 0.05
-        return np.array([(self.u - 5.0 * current) / 0.02, 9.81 - pull, speed])
+        return (self.u - 5.0 * current) / 0.02, 9.81 - pull, speed
 
     def step(self, t: float, h: float) -> None:
         count = int(np.ceil(h / 0.00025 - 1e-6))
         h /= count
         for _ in range(count):  # by the method of Runge and Kutta
-            a = self.rate(self.kept)
-            b = self.rate(self.kept + 0.5 * h * a)
-            c = self.rate(self.kept + 0.5 * h * b)
-            self.kept = self.kept + h / 6.0 * (a + 2.0 * b + 2.0 * c + self.rate(self.kept + h * c))
+            a = self.later(0.0)
+            b = self.later(0.5 * h, a)
+            c = self.later(0.5 * h, b)
+            each = zip(self.kept.tolist(), a, b, c, self.later(h, c))
+            self.kept = np.array([x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d) for x, a, b, c, d in each])
 
 
 def test_pulses_are_enlarged_where_rounding_spoils_states_that_hardly_move_the_output() -> None:
