@@ -137,26 +137,22 @@ def test_inputs_set_twice_count_as_set_last(instance: Instance, flight: Flight, 
         assert instance.everything() == expected
 
 
-@pytest.mark.parametrize("when", ["instantiated", "initialisation mode", "both"])
+@pytest.mark.parametrize("when", ["instantiated", "initialisation mode"])
 def test_start_values_may_be_set_before_or_in_initialisation_mode(
     when: str, instance: Instance, flight: Flight, plain: Rows
 ) -> None:
     values = {**flight.inputs(0), **flight.start}
-    if when != "initialisation mode":
+    if when == "instantiated":
         instance.set(values)
     instance.fmu.setupExperiment(startTime=0.0)
     instance.fmu.enterInitializationMode()
-    if when != "instantiated":
+    if when == "initialisation mode":
         instance.set(values)
     instance.fmu.exitInitializationMode()
     assert flight.fly(instance, 0, STEPS) == plain
 
 
-@pytest.mark.parametrize(
-    "setup",
-    [{"stopTime": 30.0}, {"tolerance": 1e-4}, {"tolerance": 1e-4, "stopTime": 30.0}, {"stopTime": 1e300}],
-    ids=str,
-)
+@pytest.mark.parametrize("setup", [{"tolerance": 1e-4, "stopTime": 30.0}, {"stopTime": 1e300}], ids=str)
 def test_stop_time_and_tolerance_change_nothing_up_to_the_stop(
     setup: dict[str, float], instance: Instance, flight: Flight, plain: Rows
 ) -> None:
@@ -310,25 +306,24 @@ def test_outputs_can_be_read_after_terminate(instance: Instance, flight: Flight,
     assert instance.everything() == plain[-1]
 
 
-@pytest.mark.parametrize("phase", ["instantiated", "initialisation mode", "stepping", "terminated", "failed"])
-def test_reset_from_any_phase_gives_the_first_flight_again(
-    phase: str, instance: Instance, flight: Flight, plain: Rows
-) -> None:
-    instance.set({"gravity": 5.0})
-    if phase == "initialisation mode":
-        instance.fmu.setupExperiment(startTime=3.0)
-        instance.fmu.enterInitializationMode()
-    elif phase != "instantiated":
-        instance.initialise(nonsense(flight, 1), start=3.0)
-        instance.step(3.0, 0.5)
-    if phase == "terminated":
-        instance.fmu.terminate()
-    if phase == "failed":
-        with pytest.raises(FMICallException):
-            instance.set({"mass": 1.0})
-    instance.fmu.reset()
-    flight.begin(instance)
-    assert flight.fly(instance, 0, STEPS) == plain
+def test_reset_from_any_phase_gives_the_first_flight_again(instance: Instance, flight: Flight, plain: Rows) -> None:
+    for phase in ("instantiated", "initialisation mode", "stepping", "terminated", "failed"):
+        instance.set({"gravity": 5.0})
+        if phase == "initialisation mode":
+            instance.fmu.setupExperiment(startTime=3.0)
+            instance.fmu.enterInitializationMode()
+        elif phase != "instantiated":
+            instance.initialise(nonsense(flight, 1), start=3.0)
+            instance.step(3.0, 0.5)
+        if phase == "terminated":
+            instance.fmu.terminate()
+        if phase == "failed":
+            with pytest.raises(FMICallException):
+                instance.set({"mass": 1.0})
+        instance.fmu.reset()
+        flight.begin(instance)
+        assert flight.fly(instance, 0, STEPS) == plain, phase
+        instance.fmu.reset()
 
 
 @pytest.mark.parametrize("model", sample([*PAIR], 1))
@@ -356,9 +351,8 @@ def test_fmus_fly_on_while_others_are_unloaded_and_their_files_deleted(
 
 
 @pytest.mark.parametrize("called", ["", "two words", "Quadrocoptère 四旋翼", "100 %s", "a" * 1000])
-@pytest.mark.parametrize("model", PAIR)
-def test_an_instance_may_have_any_name(model: str, called: str, built: dict[str, Path]) -> None:
-    with Instance(built[model], name=called) as first, Instance(built[model], name=called) as second:
+def test_an_instance_may_have_any_name(called: str, built: dict[str, Path]) -> None:
+    with Instance(built[PLANT], name=called) as first, Instance(built[PLANT], name=called) as second:
         first.initialise({})
         second.initialise({})
         with pytest.raises(FMICallException):

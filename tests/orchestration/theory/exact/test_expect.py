@@ -152,10 +152,10 @@ def test_a_run_with_noise_that_leaves_what_is_linear_puts_the_expectation_in_dou
 ) -> None:
     system = dataclasses.replace(example("minimum_variance"), operating_point=rests)
     narrow = dataclasses.replace(system, criterion=Criterion(diverged="abs(plant.x) > 1.5"))
-    assert expect(system).doubt == ""
-    found = expect(narrow)
+    plain, found = expect(system), expect(narrow)
+    assert plain.doubt == ""
     assert re.match(r"a run from rest with this noise \(seed 0\) diverges after \d[.\d]* s: the expect", found.doubt)
-    assert found.objectives == expect(system).objectives
+    assert found.objectives == plain.objectives
     assert not expect(dataclasses.replace(narrow, sources={})).doubt  # rests
     path = tmp_path / "system.toml"
     path.write_text(narrow.to_toml())
