@@ -73,7 +73,7 @@ def test_the_last_step_may_not_reach_over_the_stop_time(it: Instance) -> None:
 
 def test_without_a_stop_time_there_is_no_end(it: Instance) -> None:
     begin(it)
-    for k in range(50):
+    for k in range(32):
         it.step(float(k), 1.0)
 
 

@@ -131,6 +131,7 @@ class Excitation:
         self._read()
         self.at_rest = self._outputs_now.copy()
         self.weight = np.maximum(1.0, np.abs(self.at_rest))
+        self._around = [*zip(self.at_rest.tolist(), self.weight.tolist())]
 
     @property
     def name(self) -> str:
@@ -249,11 +250,11 @@ class Excitation:
         return np.asarray((up - down) / self.weight / (2.0 * factor * self.pulse))
 
     def _is_followed(self, outputs: Floats, largest: float) -> bool:
-        return bool(np.abs((outputs - self.at_rest) / self.weight).max(initial=0.0) <= largest)
+        return all(abs((y - rest) / weight) <= largest for y, (rest, weight) in zip(outputs.tolist(), self._around))
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
-        up, down = (self.course(self.rest, [(self.held + move * x, rung) for x in moves]) for move in MOVES)
+        up, down = (self.course(self.rest, [(x, rung) for x in self.held + move * moves]) for move in MOVES)
         return np.asarray(0.5 * (up - down))
 
     # -- coarse rounding -------------------------------------------------------------------------------------------

@@ -221,10 +221,10 @@ class Tangent(LinearSimulator):
         for i, name in enumerate(self.inputs[:several]):
             move = np.zeros(len(self.inputs))
             move[i::several] = 0.5 * excitation.pulses[i::several]
-            predicted, state = np.zeros((steps, cut)), np.zeros(len(self.state))
+            predicted, state, moved = np.zeros((steps, cut)), np.zeros(len(self.state)), by_input @ move
             with np.errstate(over="ignore", invalid="ignore"):  # beyond what is compared
                 for k in range(steps):
-                    after = by_state @ state + by_input @ move
+                    after = by_state @ state + moved
                     predicted[k], state = after[:cut], after[cut:]
             known = 2.0 * np.abs(predicted[:first]).max(axis=0, initial=0.0)
             beyond = np.flatnonzero((np.abs(predicted[first:]) > known).any(axis=1))
@@ -269,7 +269,9 @@ class Tangent(LinearSimulator):
             produced += latest
             columns += [excitation.futures(states, ladder) for states in latest]
             noise += [errors.of_futures(i, point) for i in range(len(latest))]
-            found = self._coordinates(np.column_stack(columns), np.column_stack(noise)) if latest else None
+            found = None
+            if latest and point >= min(fewest, self._points) - 3:  # of earlier ones no rank is looked at
+                found = self._coordinates(np.column_stack(columns), np.column_stack(noise))
             ranks.append(0 if found is None else len(found[1]))
             if len(ranks) >= fewest and len(set(ranks[-3:])) == 1:
                 break
