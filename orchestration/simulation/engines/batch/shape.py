@@ -55,7 +55,8 @@ def _outline_between(
     objectives: Mapping[str, str],
 ) -> Hashable:
     return (
-        tuple(map(_outline_of, connections)), frozenset(each.message.connection for each in placed_messages(networks)),
+        tuple(map(_outline_of, connections)),
+        frozenset(each.message.connection for each in placed_messages(networks)) - {None},  # load is no connection
         tuple((name, source.to, _kind(source), source.trajectory) for name, source in sources.items()),
         tuple(objectives.items()),
     )  # fmt: skip

@@ -15,6 +15,7 @@ from orchestration.foundation.basics.errors import QuadcosimError
 from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, Sample
 from orchestration.simulation.workers.row import Outcome, Results, Rows
 from orchestration.simulation.workers.task import RunTask, TaskBatch
+from orchestration.systems.system.computers import Message, Network
 from orchestration.systems.system.model import System
 from quadcosim import Scenario
 from tests.orchestration.components.fmi.small import needs_compiler, nothing_known
@@ -200,3 +201,14 @@ def test_other_code_is_compared_anew(unknown: Path, several: Study, monkeypatch:
             assert place(several) != before, name
     files.hashes[python_twin(several.system(0, {}).components["plant"].fmu)] = "other"
     assert place(several) != before
+
+
+def test_a_network_may_have_load_beside_the_messages_of_connections(several: Study) -> None:
+    load = Message(period=0.01, bytes=8, identifier=1)
+    command = Message(connection="command", bytes=8, identifier=2)
+    bus = Network(kind="can", bit_rate=500e3, messages={"load": load, "command": command})
+    system, files = several.system(0, {}), several.files()
+    with_both, with_one = (
+        replace(system, networks={"bus": replace(bus, messages=some)}) for some in (bus.messages, {"command": command})
+    )
+    assert kept.place_of([with_both], files) == kept.place_of([with_one], files) != kept.place_of([system], files)
