@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.theory.certificates.causes import ScheduledLoop
 from orchestration.theory.certificates.certificate import Certificate, Checked, read_certificate
@@ -38,16 +39,21 @@ def check_certificate(path: str | Path, request: RequestLike | None = None) -> C
     proof, up_to = verified(certificate), None
     if request is not None:
         request = request_of(request)
-        cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
+        with prefixed(f"{path} is of another system: "):
+            cause = cause_in(request, certificate.of[0]) if len(certificate.of) == 1 else None
         if cause is None:
             expect_without_scheduler(request)
-            varying = [varying_of(request, of) for of in certificate.of]
+            with prefixed(f"{path} is of another system: "):
+                varying = [varying_of(request, of) for of in certificate.of]
             family = _family_for(certificate, LoopTimeline(linear_loop_of(request), varying), varying)
         else:
             scheduled = ScheduledLoop(linear_loop_of(request), rested(request), cause)
             up_to = scheduled.value_of(certificate.family)
             family = scheduled.family(up_to)
-        expect_same_family(certificate, family)
+        try:
+            expect_same_family(certificate, family)
+        except AnotherLoop as error:
+            raise AnotherLoop(f"{path}: {error}; expected the system, and the flags, with which it was made") from None
     return replace(proof, of=() if request is None else certificate.of, up_to=up_to)
 
 
@@ -65,15 +71,29 @@ def _family_for(certificate: Certificate, timeline: LoopTimeline, varying: list[
 def expect_same_family(certificate: Certificate, family: LoopFamily | None) -> None:
     """Raise `AnotherLoop` where a certificate is not of that family, within the radius that its proof covers."""
     own = certificate.family
+    if family is not None and (ours := _lasts(own)) != (other := _lasts(family)):
+        raise AnotherLoop(f"it is of a loop with a period of {ours}, the system has {other}")
     if family is not None and certificate.basis is not None:
         family = family.in_basis(certificate.basis) if family.accepts(certificate.basis) else None
     if family is None or (family.kept, family.letters) != (own.kept, own.letters):
-        raise AnotherLoop("the events of a period of the system are not those of the certificate")
+        raise AnotherLoop(
+            "in a period of the system other events come, or at other times, as with another delay, offset, order or "
+            "component"
+        )
     if family.matrices.keys() != own.matrices.keys():
-        raise AnotherLoop("the system has other matrices than the certificate")
+        raise AnotherLoop("the system has other events than the certificate")
     for name, theirs in family.matrices.items():
         if not _is_within(own.matrices[name], theirs, certificate.radius):
-            raise AnotherLoop(f"{name}: the system's matrix is farther from the certificate's than the proof covers")
+            raise AnotherLoop(
+                f"{name}: the system's matrix is farther from the certificate's than the proof covers, as with another "
+                "parameter"
+            )
+
+
+def _lasts(family: LoopFamily) -> str:
+    """How long letters last, in words: the period, or its pieces."""
+    found = {round(sum(f.times[0] for f in x.product if f.times is not None), 12) for x in family.letters}
+    return " and ".join(quantity(each, "s") for each in sorted(found))
 
 
 def _is_within(own: Floats, theirs: Floats, radius: float) -> bool:

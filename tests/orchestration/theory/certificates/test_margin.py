@@ -87,8 +87,16 @@ def test_a_certificate_is_of_its_own_system_and_of_no_other(
     assert own.of == (COMMAND,)
     assert own.ranges == {"late": ((0.0, found.certified),)}
     slower = changed(system, {"components.controller.sampling.period": 1.01})
-    with pytest.raises(UsageError, match="the events of a period of the system are not those"):
+    with pytest.raises(
+        UsageError, match=r"certificate.json: it is of a loop with a period of 1 s, the system has 1\.01 "
+    ):
         check_certificate(path, slower)
+    with pytest.raises(UsageError, match=r"in a period of the system other events come, or at other times"):
+        check_certificate(path, changed(system, {"connections.command.delay": 0.01}))
+    with pytest.raises(
+        UsageError, match=r"certificate.json is of another system: connections.command.delay_jitter: exp"
+    ):
+        check_certificate(path, example("four_components"))
     with pytest.raises(UsageError, match="controller samples: the system's matrix is farther"):
         check_certificate(path, changed(system, {"connections.command.scale": 1.00001}))
 
@@ -138,7 +146,7 @@ def test_a_certificate_of_another_quantity_is_refused(system: System, found: Cer
     path = tmp_path / "other.json"
     for of in ([SAMPLE], [LOST], [COMMAND, SAMPLE]):
         path.write_text(json.dumps(json.loads(found.certificate) | {"of": of}), encoding="utf-8")
-        with pytest.raises(UsageError, match=r"other quantities vary|not those of the certificate"):
+        with pytest.raises(UsageError, match=r"other quantities vary|other events come"):
             check_certificate(path, system)
 
 
@@ -319,7 +327,7 @@ def test_the_command_writes_what_it_checks(
     assert f"late               0 to {document['certified']:.9g} s, any number of times in a row" in text
     assert "connections.command.delay_jitter of this system" in text
     assert "no system was given" in output_of(capsys, "margin", "--check", path)
-    assert "not those of the certificate" in one_line(
+    assert "period of 1 s, the system has 900 ms" in one_line(
         output_of(capsys, "margin", "--check", path, file, *other, code=2)
     )
 
