@@ -11,7 +11,7 @@ from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import in_columns, inform
-from orchestration.foundation.basics.unit_algebra import time_text
+from orchestration.foundation.basics.unit_algebra import counted, time_text
 
 if TYPE_CHECKING:
     from orchestration.systems.system.request import Request
@@ -175,7 +175,7 @@ def linearise(
     if scenario is not None and scenario.suffix.lower() == ".fmu" and component is None:
         return _of_plant(request_from(scenario, dataclasses.replace(flags, period=None), timing), flags.period)
     from orchestration.theory.stability.linearise import linearise as linearised_loop
-    from orchestration.theory.stability.poles import REAL, in_words
+    from orchestration.theory.stability.poles import REAL, in_words, or_alias
 
     loop = linearised_loop(request_from(scenario, flags, timing), component)
     halves = {loop.name: loop.component, "rest": loop.rest}
@@ -187,6 +187,7 @@ def linearise(
             {"real": one.z.real, "imaginary": one.z.imag, "frequency": one.frequency, "damping": one.damping}
             for one in loop.poles
         ],
+        "turn": loop.turn,
     }
     lines = [f"{name:<17}  {_summary(half, loop.samples)}" for name, half in halves.items()]
     rows = [("pole", "size", "frequency", "damping")]
@@ -195,6 +196,8 @@ def linearise(
             damped = "-" if pole.damping is None else f"{pole.damping:.3f}"
             rows.append((in_words(pole.z), f"{abs(pole.z):.4f}", f"{pole.frequency:.4g} rad/s", damped))
     lines += in_columns(rows, right=True) if loop.poles else ()
+    if loop.turn:
+        lines.append(f"frequencies are these{or_alias(loop.turn)}: poles of several rates do not tell which")
     if len(loop.poles) < len(loop.component.A) + len(loop.rest.A):
         lines.append("poles at z = 0 are not listed: they are of what a period forgets")
     return CommandResult(document=document, verdict=loop.verdict, lines=lines)
@@ -235,11 +238,9 @@ def _matrices(system: "StateSpace") -> dict[str, object]:
 
 
 def _summary(system: "StateSpace", samples: int) -> str:
-    from orchestration.theory.stability.linearise import states_text
-
     inputs, outputs = (
         ", ".join(name.removesuffix("[0]") if samples > 1 else name for name in names[: len(names) // samples])
         for names in (system.inputs, system.outputs)
     )
     each = "" if samples == 1 else f", each at {samples} samples"
-    return f"{inputs} → {outputs}{each}; {states_text(len(system.A))}, every {time_text(system.dt)}"
+    return f"{inputs} → {outputs}{each}; {counted(len(system.A), 'state')}, every {time_text(system.dt)}"

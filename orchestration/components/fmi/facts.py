@@ -20,7 +20,7 @@ from orchestration.components.fmi.read_description import (
     items_text,
 )
 from orchestration.foundation.basics.terminal import in_columns
-from orchestration.foundation.basics.unit_algebra import time_text
+from orchestration.foundation.basics.unit_algebra import counted, time_text
 
 _ORDER = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "local", "independent")
 _CAPABILITIES: Mapping[str, Any] = {
@@ -81,9 +81,9 @@ class Facts:
     def verdict(self) -> str:
         """What it is, by whom it is called, and how many variables of each causality it has."""
         counts = [(sum(v.causality == of for v in self.variables), of) for of in _ORDER[:3]]
-        named = [f"{count} {of}{'' if count == 1 else 's'}" for count, of in counts]
-        named += [f"{self.continuous_states} continuous states"] if self.continuous_states else []
-        named += [f"{len(self.clocks)} clock{'' if len(self.clocks) == 1 else 's'}"] if self.clocks else []
+        named = [counted(count, of) for count, of in counts]
+        named += [counted(self.continuous_states, "continuous state")] if self.continuous_states else []
+        named += [counted(len(self.clocks), "clock")] if self.clocks else []
         return f"{self.model}: FMI {self.fmi_version}, {' and '.join(self.interfaces)}; {', '.join(named)}"
 
 

@@ -80,8 +80,7 @@ def _draw_values(axes: Axes, result: Limit, across: Quantity) -> None:
     values = [one.measured or 0.0 for one in known]
     if min(values) > 0.0 and max(values) > 20.0 * min(values):
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter("" if max(values) > 100.0 * min(values) else "{x:g}")
+        plain(axes.yaxis)
     axes.set_ylabel(labels.with_unit(labels.metric(result.judged or ""), result.judged_unit))
 
 

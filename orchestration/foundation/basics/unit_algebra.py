@@ -269,6 +269,11 @@ def time_text(value: float) -> str:
     return quantity(value, "s", EXACT_DIGITS)
 
 
+def counted(count: int, what: str) -> str:
+    """So many of what a noun names, as `1 state` and `2 states`."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def some(texts: Iterable[str], separator: str = ", ") -> str:
     """The first few of some texts, and how many more there are."""
     known = list(texts)

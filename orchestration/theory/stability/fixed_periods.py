@@ -24,8 +24,9 @@ from orchestration.theory.stability.scheduled import expect_certain, without_sch
 ROUNDING = 1
 """Variation that is rounding, where a period is no whole number [ns]"""
 INSTEAD = (
-    "a linearised loop needs one phase and one latency: expected expect or limit by runs, which need neither, or "
-    "sampling.period and a delay of the latency that schedule prints, in place of the computer"
+    "a linearised loop needs one phase and one latency: expected a priority or offsets by which it has them; expect or "
+    "limit by runs, which need neither; or in place of the computer sampling = { period = SECONDS } of the component, "
+    "and as delay of what it sends the latency that schedule prints"
 )
 
 

@@ -13,7 +13,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.foundation.basics.unit_algebra import quantity
+from orchestration.foundation.basics.unit_algebra import counted, quantity
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.runs.replacement import component_named
@@ -28,6 +28,7 @@ from orchestration.theory.stability.lifted_component import lifted_names
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, expect_whole_instances, whole_at_rest
 from orchestration.theory.stability.matrices import of_lifted
+from orchestration.theory.stability.operating_point import inform_of_chance, turn_of
 from orchestration.theory.stability.period_map import period_map
 from orchestration.theory.stability.poles import Pole, as_poles, poles_of
 from orchestration.theory.stability.state_space import StateSpace, reduced
@@ -63,6 +64,9 @@ class Linearised:
     deviations decay."""
     poles: tuple[Pole, ...]
     """The poles of the whole loop, as `radius`, the slowest first, without those at 0."""
+    turn: float | None = None
+    """Whole turns in the period of several rates [rad/s]: by multiples of it the frequency of a pole may be another;
+    None: one rate."""
     in_double: tuple[str, ...] = ()
     """The components whose float code in C is taken in double precision."""
 
@@ -72,8 +76,8 @@ class Linearised:
     @property
     def verdict(self) -> str:
         """Whether the linear loop is stable, and its sizes."""
-        sizes = f"{self.name} with {states_text(len(self.component.A))}, the rest with {states_text(len(self.rest.A))}"
-        sizes += ", those that inputs reach and outputs show"
+        law, rest = (counted(len(half.A), "state") for half in (self.component, self.rest))
+        sizes = f"{self.name} with {law}, the rest with {rest}, those that inputs reach and outputs show"
         return f"{stability_of(self.radius)}, {self.clock}: {sizes}{of_code(self.in_double)}"
 
     @property
@@ -111,6 +115,7 @@ def in_isolation(
         files = files_of(system := system_of(loaded))
         if is_loop:
             warn_of_periods(system, files)
+            inform_of_chance(system)
     return isolated_call(files.fmus.values(), find, loaded, asked)
 
 
@@ -137,7 +142,7 @@ def sampled_component(system: System, component: str | None) -> str:
             "{ period = SECONDS }, as quadcosim connect PLANT.fmu CONTROLLER.fmu proposes; the matrices of one FMU are "
             "those of quadcosim linearise PLANT.fmu, in Python plant_at_start"
         )
-    return component_named(system, component, "at which to cut the loop open", only_sampled=True)
+    return component_named(system, component, "at which to cut the loop open, the others closed", only_sampled=True)
 
 
 def cut_open(loop: AtRest, name: str) -> Linearised:
@@ -157,6 +162,7 @@ def cut_open(loop: AtRest, name: str) -> Linearised:
         samples=samples,
         radius=float(np.abs(np.linalg.eigvals(whole)).max(initial=0.0)),
         poles=as_poles(poles_of(whole), rest.dt),
+        turn=turn_of(loop.simulation.system, rest.dt),
         in_double=loop.in_double,
     )
 
@@ -193,8 +199,3 @@ def stability_of(radius: float) -> str:
         return f"not decidably stable: spectral radius {radius:.9g}"
     shown = f"{radius:.4g}" if abs(radius - 1.0) > 1e-3 else f"{radius:.9g}"
     return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {shown}"
-
-
-def states_text(count: int) -> str:
-    """So many states, in words."""
-    return f"{count} state{'' if count == 1 else 's'}"

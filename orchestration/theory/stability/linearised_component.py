@@ -16,6 +16,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.unit_algebra import counted
 from orchestration.theory.stability.excitation import (
     MOVES,
     ROUNDING,
@@ -201,9 +202,9 @@ class Tangent(LinearSimulator):
         self.accuracy = float((error / np.where(largest > 0.0, largest, 1.0)).max(initial=0.0))
         if not self.accuracy <= UNPROVEN:
             raise UsageError(
-                f"{excitation.name}: its linear model, of {len(state)} states, does not predict the response to a "
-                f"random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, expected at most "
-                f"{UNPROVEN:g}"
+                f"{excitation.name}: its linear model, of {counted(len(state), 'state')}, does not predict the "
+                f"response to a random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, "
+                f"expected at most {UNPROVEN:g}"
             )
 
     def prove_held(self, h: float, samples: int = 1) -> None:
@@ -253,9 +254,9 @@ class Tangent(LinearSimulator):
         stay = [y for y, one in zip(self.outputs, still) if one]
         cause = f"where {stay[0]} stays the same, as at a limit" if stay else "as where rounding hides a slow integral"
         raise UsageError(
-            f"{excitation.name}: its linear model, of {len(self.state)} states, does not predict the response to "
-            f"{name} held over {count * rung.h:.3g} s: off by {before.max():.1g} of it, expected at most {UNSEEN:g}, "
-            f"{cause}"
+            f"{excitation.name}: its linear model, of {counted(len(self.state), 'state')}, does not predict the "
+            f"response to {name} held over {count * rung.h:.3g} s: off by {before.max():.1g} of it, expected at most "
+            f"{UNSEEN:g}, {cause}"
         )
 
     # -- coordinates --------------------------------------------------------------------------------------------
@@ -283,7 +284,8 @@ class Tangent(LinearSimulator):
         self._axes, chosen, self._back = found
         if ranks[-1] == min(len(columns), len(self._axes)):
             known = (
-                f"{excitation.name}: has {ranks[-1]} states or more, as {len(ranks)} pulses and {len(ladder)} steps "
+                f"{excitation.name}: has {counted(ranks[-1], 'state')} or more, as {counted(len(ranks), 'pulse')} and "
+                f"{counted(len(ladder), 'step')} "
             )
             growth = max(map(self._growth, range(len(excitation.inputs))))
             if growth > FAST:

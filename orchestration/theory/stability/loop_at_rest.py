@@ -27,7 +27,7 @@ from orchestration.simulation.runs.prepared import PreparedRun, prepared
 from orchestration.systems.system.component import Component, Parameter, Sampling
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.distribution import highest
-from orchestration.systems.system.model import System
+from orchestration.systems.system.model import AFTER, System
 from orchestration.theory.stability.equilibrium import Steady, balance
 from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.fixed_periods import in_fixed_periods
@@ -470,7 +470,7 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
         for k in range(SETTLED):
             if master.run(pause_at=round(begin + k * period)):
                 why = master.divergence or master.running.termination or "it was interrupted"
-                rest = f" in {after:g} s" if after else ""
+                rest = f" in {after:g} s, or without {AFTER} such at which it rests" if after else ""
                 raise NotAnEquilibriumError(
                     f"unstable here, no rest: the run leaves the operating point: {why}: expected values in "
                     f"[operating_point] from which it comes to rest{rest}"

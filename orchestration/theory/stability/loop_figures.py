@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.ticker import LogFormatter, MultipleLocator
+from matplotlib.ticker import MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.unit_algebra import in_brackets
-from orchestration.simulation.figures.lines import label_time
+from orchestration.simulation.figures.lines import label_time, plain
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal, unit
@@ -26,10 +25,12 @@ SHOWN = 1.4
 """Largest part of a pole that is drawn"""
 NEAR, MOST = 2.0, 0.4
 """Half the width of the panel about 1, in distances of the slower half of the poles from it, and at most"""
-LINEAR = 2.0
-"""Largest spectral radius over which its axis is linear"""
-LOWEST = 0.1
-"""Least spectral radius that is drawn on an axis that is not"""
+SHALLOW = 0.1
+"""Share of the largest distance of a radius from 1, below which that of another stretch, or 1, is no longer seen"""
+CLOSEST = 1e-6
+"""Least distance from 1 that has a decade of its own"""
+TICKS = 5
+"""Most powers of ten with a number on either side of 1"""
 LOWEST_PHASE = -720.0
 """Phase down to which it is drawn [°]: that of a long delay falls on and on"""
 ANGLES = (15.0, 30.0, 45.0, 90.0, 180.0)
@@ -40,10 +41,10 @@ ROW = 0.12
 """Height of one, as a share of that of the curve"""
 WIDTH = 0.6
 """Width of a character, as a share of its height"""
-PLAIN, DECADES = 1e3, 1.7
-"""Ratio of the ends of a logarithmic axis up to which its numbers are plain, and decades up to which there are more"""
 EDGE = 0.25
 """Share of the width, from a side, in which a label has no room towards it"""
+CALM = 3.0
+"""Settling times of the slowest loop after which the axis of a step ends"""
 LEAST = 1e-12
 """Least gain that is drawn: less is rounding, as of a slow task beyond half its own rate"""
 
@@ -81,12 +82,15 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
             middle.axhline(360.0 * turns - 180.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
-    above.secondary_xaxis("top", functions=(lambda w: w / math.tau, lambda f: f * math.tau)).set_xlabel(
-        "frequency [Hz]"
-    )
     middle.set(ylabel="phase of L [°]")
     below.set(ylabel="sensitivity |1 / (1 + L)| [dB]", xlabel="frequency [rad/s], up to half the sampling rate")
     below.set_xlim(result.frequencies[0], result.frequencies[-1])
+    hertz = above.twiny()
+    hertz.set(xscale="log", xlabel="frequency [Hz]", xlim=result.frequencies[[0, -1]] / math.tau)
+    hertz.grid(visible=False)
+    hertz.spines["top"].set_visible(True)
+    for axes in (below, hertz):
+        plain(axes.xaxis)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
@@ -107,8 +111,9 @@ def _mark_margins(
     """The margins as lines at their crossovers, from where they would be none, with their sizes beside the middle."""
     above, middle = panels
     lines = [
-        (above, max(one.frequency, frequencies[0]), 0.0, -decibels, f"× {one.factor:.3g} ({decibels:.3g} dB)")
+        (above, at, 0.0, -decibels, f"× {one.factor:.3g} ({decibels:.3g} dB)")
         for one in loop.gain_margins
+        for at in [float(np.clip(one.frequency, frequencies[0], frequencies[-1]))]
         for decibels in [20.0 * math.log10(one.factor)]
     ]
     if loop.crossover is not None and loop.phase_margin is not None:
@@ -146,7 +151,8 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
             label=in_brackets(signal(loop.output, {}), None if shared else unit(loop.unit)),
         )  # fmt: skip
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
-    axes.set(ylabel=in_brackets("taken back of a step of 1", shared), xlim=(0.0, result.times[-1]))
+    end = min(float(result.times[-1]), CALM * result.slowest.settling_time) or float(result.times[-1])
+    axes.set(ylabel=in_brackets("taken back of a step of 1", shared), xlim=(0.0, end))
     label_time(axes)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
@@ -189,51 +195,74 @@ def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:
     close.set(xlim=(1.0 - half, 1.0 + half), ylim=(-half, half), title="about z = 1")
     close.locator_params(nbins=5)
     bar = figure.colorbar(dots, ax=[plane, close], label=across.title, location="bottom", aspect=40.0)
-    if is_wide:
-        _label_plainly(bar.ax.xaxis, values[-1] / values[0])
+    plain(bar.ax.xaxis)
     _draw_radius(over, result, across)
     return figure
 
 
 def _draw_radius(axes: Axes, result: RootLocus, across: Quantity) -> None:
     """The spectral radius over the quantity; lines lead from where it is 1 to the values, in room above the curve."""
-    tried = across.of(result.curve[0])
-    axes.plot(tried, result.curve[1], color=BLUE)
-    axes.axhline(1.0, color=BLACK, linewidth=1.0)
+    tried, radius, edge = across.of(result.curve[0]), result.curve[1], 1.0
     axes.set(xlabel=across.title, ylabel="spectral radius", xlim=(tried[0], tried[-1]))
-    low, high = min(float(result.radius.min()), 1.0), max(float(result.radius.max()), 1.0)
-    if is_wide := high > LINEAR:
-        axes.set_yscale("log")
-        _label_plainly(axes.yaxis)
-        low, high = math.log(max(low, LOWEST)), math.log(high)
+    if (closest := _closest(radius)) is not None:
+        radius, edge = radius - 1.0, 0.0
+        axes.set_yscale("symlog", linthresh=closest, linscale=0.5)
+        axes.set_ylabel("spectral radius − 1")
+    axes.plot(tried, radius, marker=".", markersize=4.0, color=BLUE)
+    axes.axhline(edge, color=BLACK, linewidth=1.0)
     if _has_logarithm(result):
         axes.set_xscale("log")
-        _label_plainly(axes.xaxis, tried[-1] / tried[0])
-    labels = [across.text_of(one.value, one.digits) for one in result.crossings]
-    rows, lefts = _rows_of(axes, [float(across.of(one.value)) for one in result.crossings], labels)
+    plain(axes.xaxis)
+    ends = [across.of(one.ends) for one in result.crossings]
+    places = [float(end.mean()) for end in ends]
+    labels = [
+        " to ".join([*(f"{x:.{one.digits}g}" for x in end[:-1]), across.text_of(one.ends[-1], one.digits)])
+        for one, end in zip(result.crossings, ends)
+    ]
+    rows, lefts = _rows_of(axes, places, labels)
+    scale = axes.yaxis.get_transform()
+    low, high = scale.transform([min(np.nanmin(radius), edge), max(np.nanmax(radius), edge)])
     count, margin = max((row + 1 for row in rows if row is not None), default=0), 0.05 * (high - low)
     top = high + margin + count * ROW * (high - low)
-    places = np.array([low - margin, top, *(top - ROW * (high - low) * (np.arange(count) + 0.9))])
-    lowest, highest, *texts = np.exp(places) if is_wide else places
+    heights = np.array([low - margin, top, *(top - ROW * (high - low) * (np.arange(count) + 0.9))])
+    lowest, highest, *texts = scale.inverted().transform(heights)
     axes.set_ylim(lowest, highest)
-    for one, label, row, left in zip(result.crossings, labels, rows, lefts):
-        at = float(across.of(one.value))
-        axes.plot(at, 1.0, "x", color=RED)
+    if closest is not None:
+        axes.yaxis.set_ticks(_powers(closest, lowest, highest))
+    for end, at, label, row, left in zip(ends, places, labels, rows, lefts):
+        if len(end) > 1:
+            axes.axvspan(*end, color=RED, alpha=0.3, linewidth=0.0)
+        else:
+            axes.plot(at, edge, "x", color=RED)
         if row is None:
             continue
-        axes.plot([at, at], [1.0, texts[row]], color=RED, linewidth=1.0, linestyle=":")
+        axes.plot([at, at], [edge, texts[row]], color=RED, linewidth=1.0, linestyle=":")
         beside: dict[str, Any] = {"xytext": (-4.0 if left else 4.0, 0.0), "ha": "right" if left else "left"}
         axes.annotate(label, (at, texts[row]), textcoords="offset points", **beside)
 
 
+def _closest(radius: Floats) -> float | None:
+    """The distance from 1 within which an axis about it is linear; None: each stretch is seen if all of it is.
+
+    A power of ten that all stretches between crossings exceed.
+    """
+    known = radius[np.isfinite(radius)] - 1.0
+    begins = np.flatnonzero(np.diff(known < 0.0, prepend=known[0] >= 0.0))
+    depths = np.maximum.reduceat(np.abs(known), begins)
+    least = min(1.0, float(depths.min()))
+    return None if least >= SHALLOW * depths.max() else 10.0 ** math.floor(math.log10(max(least, CLOSEST)))
+
+
+def _powers(first: float, lowest: float, highest: float) -> list[float]:
+    """Ticks of an axis about 0 that is logarithmic from `first` on: few powers of ten, 0 and their negatives."""
+    decades = [math.log10(max(abs(end), first) / first) for end in (lowest, highest)]
+    apart = 1 + math.floor(max(decades)) // TICKS
+    above = [first * 10.0**k for k in range(0, math.floor(max(decades)) + 1, apart)]
+    return [x for x in (*(-x for x in reversed(above)), 0.0, *above) if lowest <= x <= highest]
+
+
 def _has_logarithm(result: RootLocus) -> bool:
     return result.geometric and bool(result.values[0] > 0.0)
-
-
-def _label_plainly(axis: Axis, ratio: float = 1.0) -> None:
-    """Label a logarithmic axis with numbers, but over some decades with powers of ten; `ratio`: of its ends."""
-    for formatted in (axis.set_major_formatter, axis.set_minor_formatter) if ratio < PLAIN else ():
-        formatted(LogFormatter(minor_thresholds=(DECADES, 0.5)))
 
 
 def _rows_of(axes: Axes, places: list[float], labels: list[str]) -> tuple[list[int | None], list[bool]]:

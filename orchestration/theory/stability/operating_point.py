@@ -9,10 +9,11 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.times import exact_nanoseconds
-from orchestration.foundation.basics.unit_algebra import quantity
+from orchestration.foundation.basics.terminal import inform
+from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.systems.system.component import Component
-from orchestration.systems.system.distribution import lowest
+from orchestration.systems.system.distribution import is_random, lowest
 from orchestration.systems.system.model import AFTER, Criterion, System
 from orchestration.systems.system.paths import at_operating_point
 from orchestration.systems.system.placement import punctual
@@ -60,6 +61,22 @@ def _punctual(component: Component) -> Component:
     return replace(component, record=(), sampling=replace(component.sampling, jitter=0.0))
 
 
+def inform_of_chance(system: System) -> None:
+    """Say what `deterministic` leaves out of the times of a system, and what includes it."""
+    varied = {
+        f"connections.{x.name}": {"delay_jitter": x.delay_jitter, "loss": x.loss, "random delay": is_random(x.delay)}
+        for x in system.connections
+    }
+    varied |= {
+        f"components.{name}": {"sampling.jitter": one.sampling.jitter}
+        for name, one in system.components.items()
+        if one.sampling is not None
+    }
+    each = {place: [key for key, value in values.items() if value] for place, values in varied.items()}
+    if found := some(f"{' and '.join(keys)} of {place}" for place, keys in each.items() if keys):
+        inform(f"left out here: {found}; expect includes them in mean square, margin in any sequence")
+
+
 def longest_period(system: System) -> Fraction:
     """The longest period of sampled components, or the longest step where none is sampled [ns]."""
     return max(periods_of(system))
@@ -83,6 +100,14 @@ def periods_of(system: System) -> list[Fraction]:
     return [one.sampling.true_period for one in system.components.values() if one.sampling is not None] or [
         exact_nanoseconds(one.step) for one in system.components.values() if one.step is not None
     ]
+
+
+def turn_of(system: System, period: float) -> float | None:
+    """Whole turns in a period [s] of several rates [rad/s]: by multiples of it the frequency of a pole may be another.
+
+    None: the period is that of the only rate.
+    """
+    return math.tau / period if period > 1.5 * float(min(periods_of(system))) / NANOSECONDS else None
 
 
 def beside_others(at: Callable[[float], System], first: float, last: float) -> tuple[list[Fraction], float] | None:

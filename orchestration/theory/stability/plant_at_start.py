@@ -11,7 +11,7 @@ from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import Model, declared_of, read_model
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.unit_algebra import quantity, some
+from orchestration.foundation.basics.unit_algebra import counted, quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike
 from orchestration.simulation.runs.prepared import set_parameters
@@ -70,7 +70,7 @@ class PlantAtStart:
     def verdict(self) -> str:
         """Its sizes, and whether it rests at its start."""
         counts = [(len(self.states), "state"), (len(self.inputs), "input"), (len(self.outputs), "output")]
-        sizes = ", ".join(f"{count} {what}{'' if count == 1 else 's'}" for count, what in counts)
+        sizes = ", ".join(counted(count, what) for count, what in counts)
         moves = some(f"{name} by {rate:.4g} a second" for name, rate in self.rates.items())
         clock = "in continuous time" if self.dt is None else f"sampled every {quantity(self.dt, 's')}"
         rests = f"it does not rest there: {moves}" if moves else "it rests there"

@@ -53,6 +53,11 @@ def in_words(z: complex) -> str:
     return f"{z.real:.4f}" + (f" ± {size:{digits}}j" if size > REAL else "")
 
 
+def or_alias(turn: float | None) -> str:
+    """What is said behind the frequency of a pole over several rates, whole turns [rad/s] from which it may be."""
+    return f" or an alias by {turn:.4g} rad/s" if turn else ""
+
+
 def poles_of(matrix: Floats) -> Complexes:
     """The eigenvalues of a matrix without those at 0, which rounding would scatter where they are multiple."""
     matrix, _ = balanced(matrix)

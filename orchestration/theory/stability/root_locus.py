@@ -34,11 +34,12 @@ from orchestration.theory.stability.known_loops import rested, warn_of_periods
 from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, keep_start, whole_at_rest
 from orchestration.theory.stability.operating_point import (
     NotAnEquilibriumError,
+    inform_of_chance,
     longest_period,
-    periods_of,
+    turn_of,
 )
 from orchestration.theory.stability.period_map import OTHER_PULSE, growth_of_loop, period_map
-from orchestration.theory.stability.poles import Complexes, in_words, poles_of
+from orchestration.theory.stability.poles import Complexes, in_words, or_alias, poles_of
 from orchestration.theory.stability.several_rates import Commensurate, commensurate, narrowed
 from orchestration.theory.stability.sign_changes import short, uncertainty, zero_between
 
@@ -84,6 +85,13 @@ class Crossing:
     def jumps(self) -> bool:
         """Whether poles jump across the circle there: no value has one on it."""
         return abs(abs(self.z) - 1.0) > ON_CIRCLE
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """Its value, or in rising order the two between which it is, as where rates repeat together."""
+        ends = tuple(sorted((self.value, self.until)))
+        alike = math.isclose(*ends, abs_tol=ALIKE) or len({f"{end:.{self.digits}g}" for end in ends}) == 1
+        return ends[:1] if alike else ends
 
     @property
     def digits(self) -> int:
@@ -148,10 +156,10 @@ class RootLocus:
 
     def place_of(self, crossing: Crossing) -> str:
         """Where poles cross, in words: at a value, with the frequency, or between two where rates repeat together."""
-        ends = [quantity(value, self.unit, crossing.digits) for value in sorted((crossing.value, crossing.until))]
-        jumps = ends[0] != ends[1] and not math.isclose(crossing.value, crossing.until, abs_tol=ALIKE)
-        turns = f" or an alias by {crossing.turn:.4g} rad/s" if crossing.turn else ""
-        return f"between {' and '.join(ends)}" if jumps else f"at {ends[0]}, {crossing.frequency:.4g} rad/s{turns}"
+        ends = [quantity(value, self.unit, crossing.digits) for value in crossing.ends]
+        if len(ends) > 1:
+            return f"between {' and '.join(ends)}"
+        return f"at {ends[0]}, {crossing.frequency:.4g} rad/s{or_alias(crossing.turn)}"
 
     def pole_of(self, crossing: Crossing) -> str:
         """The pole on the circle, in words; of those that jump one outside, with its size and the value it is of."""
@@ -202,6 +210,7 @@ def locus(
         varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
     )
     warn_of_periods(varied.at(span.last), files, varied.at(span.values()[0]))
+    inform_of_chance(varied.system)
     return isolated_call(files.fmus.values(), _root_locus, varied, span, count)
 
 
@@ -270,11 +279,10 @@ class _Tried:
             )
         poles, period = self.found[outside]
         pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
-        shortest = float(min(periods_of(self.at(outside)))) / NANOSECONDS
         one = Crossing(
             value=inside, until=outside, leaves=self.radius(below) < 1.0, z=pole,
             frequency=abs(math.atan2(pole.imag, pole.real)) / period,
-            turn=2.0 * math.pi / period if period > 1.5 * shortest else None,
+            turn=turn_of(self.at(outside), period),
         )  # fmt: skip
         return one if one.jumps else replace(one, accuracy=self._accuracy_of(one))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import counted
 from orchestration.foundation.processes.passable import passable
 
 SAMPLES = (*range(32), 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
@@ -46,7 +47,8 @@ class StateSpace:
     """The entries of y."""
 
     def __repr__(self) -> str:
-        sizes = f"{len(self.inputs)} inputs, {len(self.A)} states, {len(self.outputs)} outputs"
+        counts = ((self.inputs, "input"), (self.A, "state"), (self.outputs, "output"))
+        sizes = ", ".join(counted(len(each), what) for each, what in counts)
         return f"<StateSpace: {sizes}, every {self.dt:g} s>"
 
     @explains_missing

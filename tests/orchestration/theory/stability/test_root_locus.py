@@ -112,10 +112,12 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
     assert crossing.leaves
     assert crossing.until == pytest.approx(crossing.value + 0.0004)
     assert f"leave between {1e3 * crossing.value:g} ms and {1e3 * crossing.until:g} ms (small" in found.verdict
-    before, after = (
-        linearise(changed(both, {period: value}), "controller").radius for value in (crossing.value, crossing.until)
+    stable, unstable = (
+        linearise(changed(both, {period: value}), "controller") for value in (crossing.value, crossing.until)
     )
+    before, after = stable.radius, unstable.radius
     assert before < 1.0 < after
+    assert unstable.turn == crossing.turn
     of_all = hyperperiod_of(changed(both, {period: crossing.until}))
     assert of_all is not None
     (per_longest,) = found.curve[1][found.curve[0] == crossing.until]
@@ -177,15 +179,39 @@ def test_a_wide_locus_has_its_labels_in_the_panel_and_says_how_many_poles_lie_be
     figure = found.plot()["locus"]
     figure.canvas.draw()
     over, plane = figure.axes[2], figure.axes[0]
-    assert over.get_yscale() == "log"
+    assert over.get_yscale() == "symlog"
     assert plane.get_title().endswith("not shown: 1 of 3 poles, up to |z| = 45")
     assert [text.get_text() for text in over.texts] == ["0.27", "0.98", "1.02", "10", "49.5"]  # no room for a fourth
     labels = [text.get_window_extent() for text in over.texts]
     assert not any(one.overlaps(other) for one, other in combinations(labels, 2))
-    panel, curve = over.get_window_extent(), over.transData.transform((50.0, 45.0))[1]
+    panel, curve = over.get_window_extent(), over.transData.transform((50.0, 44.0))[1]
     for label in labels:
         assert panel.x0 <= label.x0 < label.x1 <= panel.x1
         assert curve <= label.y0 < label.y1 <= panel.y1 + 2.0
+
+
+def test_a_window_of_stability_is_seen_and_poles_that_jump_lie_between_two_values() -> None:
+    """Of a radius of 0.99 beside 2: on a linear axis it is no more than the line of 1."""
+    values, radius = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([2.0, 1.2, 0.99, 1.3, 2.0])
+    at = Crossing(value=2.5, until=2.5, leaves=False, z=1.0, frequency=0.0)
+    jump = Crossing(value=3.0, until=4.0, leaves=True, z=1.3, frequency=0.0)
+    found = RootLocus(
+        of="components.controller.parameters.gain", unit=None, values=values, radius=radius,
+        poles=radius[:, None].astype(complex), crossings=(at, jump), curve=np.array([values, radius]),
+    )  # fmt: skip
+    figure = found.plot()["locus"]
+    figure.canvas.draw()
+    over = figure.axes[2]
+    assert over.get_ylabel() == "spectral radius − 1"
+    bottom, edge, top = over.transAxes.inverted().transform(over.transData.transform([(3.0, y) for y in (-0.01, 0, 1)]))
+    assert edge[1] - bottom[1] > 0.1 * (top[1] - edge[1])
+    assert over.get_yticks() == pytest.approx([-0.01, 0.0, 0.01, 0.1, 1.0])
+    assert [text.get_text() for text in over.texts] == ["2.5", "3 to 4"]
+    (band,) = over.patches
+    assert band.get_extents().transformed(over.transData.inverted()).intervalx == pytest.approx([3.0, 4.0])
+    assert sum(line.get_marker() == "x" for line in over.lines) == 1
+    even = dataclasses.replace(found, radius=radius - 0.3, curve=np.array([values, radius - 0.3]))
+    assert even.plot()["locus"].axes[2].get_yscale() == "linear"
 
 
 def test_no_label_of_a_crossing_lies_over_the_line_of_another() -> None:
