@@ -8,10 +8,6 @@ from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.terminal import in_columns, warn
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from orchestration.systems.system.files import Files
-    from orchestration.systems.system.model import System
     from orchestration.systems.system.request import Request
     from orchestration.theory.exact.expect import Expected
 
@@ -34,18 +30,16 @@ def expect(
     return CommandResult(document=expected, verdict=expected.verdict, lines=_lines(expected))
 
 
-def warn_if_means_are_infinite(
-    request: "Request", systems: "Sequence[System] | None" = None, files: "Files | None" = None
-) -> None:
-    """Warn if averages over runs of these systems have no finite expectation."""
+def warn_if_means_are_infinite(request: "Request") -> None:
+    """Warn if averages over runs have no finite expectation."""
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
-    from orchestration.theory.exact.mean_square import infinite_means_warning
+    from orchestration.theory.exact.mean_square import averages_of, infinite_means, mean_squares
 
-    systems = [system_of(request)] if systems is None else systems
-    text = infinite_means_warning(request, systems, files_of(systems[0]) if files is None else files)
-    if text is not None:
-        warn(text)
+    system = system_of(request)
+    (radius,) = mean_squares(request, [system], files_of(system)).radii
+    if radius is not None and radius >= 1.0:
+        warn(infinite_means(averages_of(system), "", radius))
 
 
 def _lines(expected: "Expected") -> list[str]:

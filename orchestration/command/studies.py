@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from orchestration.command import exact, printed_tables
+from orchestration.command import printed_tables
 from orchestration.command.figure_flags import FigureFlags
 from orchestration.command.options import option
 from orchestration.command.printed_tables import TABLE
@@ -28,9 +28,6 @@ Mean = Annotated[
     bool, option("--mean", "The mean of the metric over all runs that have it, not the median over the good ones.")
 ]
 
-FIRST = 1000
-"""Number of runs of a study that are checked for infinite means"""
-
 
 @build_option
 def sweep(
@@ -48,7 +45,6 @@ def sweep(
     from orchestration.simulation.workers.choice import engine_choice
 
     loaded = load_study(study)
-    _warn_if_means_are_infinite(loaded)
     summary = run_missing(
         loaded, out=out, workers=workers, dask=dask, retry_failed=retry_failed,
         engine=engine_choice(engine), time_limit=time_limit,
@@ -63,16 +59,6 @@ def sweep(
     keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")
     document = {name: getattr(summary, name) for name in keys}
     return CommandResult(document=document, verdict=summary.verdict, lines=lines, good=not summary.failed)
-
-
-def _warn_if_means_are_infinite(study: "Study") -> None:
-    """Warn before the sweep, so that later changes of its files have no influence."""
-    from orchestration.theory.stability.known_loops import LOOPS
-
-    if study.base.kind not in LOOPS:
-        files = study.files()
-        first = range(min(len(study.points), FIRST))
-        exact.warn_if_means_are_infinite(study.base, [study.system(i, files.start_values) for i in first], files)
 
 
 def status(study: StudyFile, out: Out = None) -> CommandResult:

@@ -6,13 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestration.command.printed_tables import PrintedTable, decimals_of, to_digits, with_interval
-from orchestration.experiments.studies.axes import name_of, names_of, picked, quantity_of
+from orchestration.experiments.studies.axes import name_of, names_of, picked, place_of, quantity_of
+from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.experiments.studies.shares import (
     BOOLEAN,
     GOOD,
     INTERVALS,
     MEAN,
     MEDIAN,
+    NO_EXPECTATION,
+    REMARK,
     WITH_VALUE,
     cells_of,
     differences_in,
@@ -27,7 +30,6 @@ from orchestration.experiments.studies.table import (
     expect_metric_of_cells,
     frame,
     meaning_of,
-    place_of,
     rows_at,
     units_in,
 )
@@ -55,7 +57,8 @@ def study_table(
         expect_mean(metric, study.repeat)
     chosen = picked(study.cell_axes, at)
     axes = [axis for axis in study.cell_axes if axis.name not in chosen]
-    rows, names = with_chance(rows_at(frame(store), chosen), study), [axis.name for axis in axes]
+    rows = with_chance(rows_at(frame(store), chosen), study, InfiniteMeans.in_store(store))
+    names = [axis.name for axis in axes]
     if not axes:
         raise UsageError("--at: expected an axis besides, for a table of cells")
     laws, units, word = laws_of(rows, names), units_in(store), study.origin.criterion.outcomes[0]
@@ -108,12 +111,13 @@ def study_table(
     if not mean and (meaning := meaning_of(study, metric, units)):
         caption += f"; {meaning}"
     if chosen:
-        caption += f"; at {place_of(study, chosen, units)}"
-    if cells["low"].isna().any():
+        caption += f"; at {place_of(study.axes, chosen, units)}"
+    without = cells[REMARK].eq(NO_EXPECTATION) if mean else cells["count"].isna()
+    if (cells["low"].isna() & ~without).any():
         caption += "; no interval where nothing is random" + ("" if is_share else ", or runs are too few")
     table = cells
     if laws is not None:  # in the rows of the second law, as in the file of differences
-        ends = found.rename(columns={end: f"difference_{end}" for end in ("low", "high")})
+        ends = found.rename(columns={end: f"difference_{end}" for end in ("low", "high", REMARK)})
         table = table.merge(ends.assign(**{laws.axis: laws.second, "minus": laws.first}), how="left", on=list(names))
     numbers = table.astype(object).where(table.notna(), None).to_dict("records")
     return PrintedTable(caption=caption, heads=[*columns], rows=[*zip(*columns.values())], numbers=numbers)
@@ -127,11 +131,13 @@ def _texts(table: "pd.DataFrame", column: str, decimals: int) -> list[str]:
 def _averages(table: "pd.DataFrame", column: str, count: str) -> list[str]:
     """Averages with their intervals and the number of runs, of all if some are left out; a dash for a missing cell."""
     rows = zip(*(table[name] for name in (column, "low", "high", count, "count" if count == WITH_VALUE else count)))
+    remarks = table[REMARK] if REMARK in table else [""] * len(table)
     return [
-        f"{to_digits(value, low, high, DIGITS)} ({number:.0f}{f' of {of:.0f}' if number < of else ''})"
+        f"{remark if remark == NO_EXPECTATION else to_digits(value, low, high, DIGITS)} "
+        f"({number:.0f}{f' of {of:.0f}' if number < of else ''})"
         if of > 0
         else "-"
-        for value, low, high, number, of in rows
+        for (value, low, high, number, of), remark in zip(rows, remarks)
     ]
 
 

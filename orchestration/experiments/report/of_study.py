@@ -18,6 +18,7 @@ from orchestration.experiments.report.tables import ColumnAxis, Row, is_good, re
 from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axes import Axis, quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
+from orchestration.experiments.studies.infinite_means import INFINITE, InfiniteMeans
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
@@ -106,7 +107,9 @@ def study_report(
     return Report(
         kind="study",
         title=name,
-        summary=summary_of(overall, words, stored) + ("" if other is None else _summary_of_other(*other)),
+        summary=summary_of(overall, words, stored)
+        + _on_means(stored, study)
+        + ("" if other is None else _summary_of_other(*other)),
         words=words,
         layouts=tuple(tracks.layouts),
         runs=tuple(embedded.runs),
@@ -163,6 +166,14 @@ def _over(
 def _summary_of_other(name: str, stored: Stored, study: Study | None) -> str:
     overall = _overall(stored, study)
     return f" Over it {name}: {summary_of(overall, words_of(stored, study), stored)}"
+
+
+def _on_means(stored: Stored, study: Study | None) -> str:
+    """Where averages over runs have no finite expectation, in a sentence; empty if nowhere, or it is not known."""
+    if study is None or INFINITE not in stored.about:
+        return ""
+    warning = InfiniteMeans.from_text(stored.about[INFINITE]).warning(study, stored.units)
+    return f" Mind {warning}." if warning else ""
 
 
 def _overall(stored: Stored, study: Study | None) -> ReportShare:

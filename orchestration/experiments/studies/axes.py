@@ -277,3 +277,9 @@ def _is_written(value: Value, text: str) -> bool:
 def edges(axis: Axis, values: Floats) -> Floats:
     """The edges of the cells around the values of an axis."""
     return cells.edges(np.unique(values), logarithmic=axis.scale == "logarithmic")
+
+
+def place_of(axes: Iterable[Axis], at: Mapping[str, Any], units: Mapping[str, str]) -> str:
+    """The values of some axes in words, as "delay 20 ms, loss 0.1"."""
+    known = {axis.name: quantity_of(axis, units) for axis in axes if axis.name in at}
+    return ", ".join(f"{known[k].name} {known[k].text_of(v) if is_number(v) else v}" for k, v in at.items())

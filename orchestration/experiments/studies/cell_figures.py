@@ -19,6 +19,8 @@ from orchestration.experiments.studies.shares import (
     INTERVALS,
     MEAN,
     MEDIAN,
+    NO_EXPECTATION,
+    REMARK,
     WITH_VALUE,
     TwoLaws,
     averages_of,
@@ -31,6 +33,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
 from orchestration.simulation.figures.lines import abreast
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
+from orchestration.simulation.figures.shades import inner
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity
@@ -51,6 +54,8 @@ ROW = 0.05
 BESIDE = 4.5
 """Distance [pt] of a number, and of a sign with one, from the middle of a cell with a dot"""
 _NO_VALUE, _SOME = "no value", "some runs left out"
+INFINITE: Any = {"marker": r"$\infty$", "markersize": 7.0, "markeredgewidth": 0.0}
+"""Mark of a mean without a finite expectation"""
 HOLLOW: Any = {"markersize": 3.5, "markerfacecolor": "white", "zorder": 3}
 OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{}  •  −"
 """Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
@@ -70,7 +75,8 @@ def cell_lines(
     """The share of good runs, or the median or mean of a metric, with its interval at 95 %, over one axis.
 
     `laws` is an axis of names, such as controllers: a line for each. A mark is hollow where some runs are left out;
-    crosses at the lower edge are values without an average. The numbers of runs averaged stand at the upper edge, in a
+    crosses at the lower edge are values without an average, and signs of infinity at the upper one means without a
+    finite expectation, which are not drawn. The numbers of runs averaged stand at the upper edge, in a
     row for each line, where there is room.
     """
     across = quantity_of(axis, units)
@@ -82,10 +88,14 @@ def cell_lines(
     column = "share" if metric == GOOD else average
     groups = _by_value(shown, laws, units)
     lacking: dict[str | tuple[float, ...], Floats] = {}
+    without: dict[str | tuple[float, ...], Floats] = {}
     lacks, numbers, hollow = [], {}, False
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
+        if REMARK in group and (infinite := group[REMARK] == NO_EXPECTATION).any():
+            without[how["color"]] = at[infinite]
+            group = group.assign(**{column: group[column].mask(infinite)})
         panel.plot(at, group[column], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
         if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
             ends = np.abs(group[["low", "high"]].to_numpy().T - group[column].to_numpy())
@@ -95,9 +105,9 @@ def cell_lines(
             panel.plot(across.of(some[axis.name]), some[column], MARKS[i % len(MARKS)], color=how["color"], **HOLLOW)
             valued = group[group[WITH_VALUE] > 0]
             numbers[how["color"]] = [*zip(across.of(valued[axis.name]), _numbers(valued, valued["count"]))]
-            if len(without := group.loc[group[WITH_VALUE] == 0, axis.name]):
-                lacking[how["color"]] = across.of(without)
-                lacks.append(f"{f'by {law} ' if law else ''}at {', '.join(map(across.text_of, without))}")
+            if len(valueless := group.loc[group[WITH_VALUE] == 0, axis.name]):
+                lacking[how["color"]] = across.of(valueless)
+                lacks.append(f"{f'by {law} ' if law else ''}at {', '.join(map(across.text_of, valueless))}")
         else:
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
     most = max((len(count) for row in numbers.values() for _, count in row), default=0)
@@ -109,15 +119,18 @@ def cell_lines(
     )
     if metric == GOOD:
         panel.set_ylim(-0.02, 1.02)
-    if numbered:
-        _write_rows(panel, numbers)
+    taken = _write_rows(panel, numbers) if numbered else 0.0
+    if without:
+        mark_edge(panel, without, beside=taken, **INFINITE)
+        panel.plot([], [], linestyle="", **INFINITE, color=BLACK if laws else BLUE, label=NO_EXPECTATION)
     if lacking:
-        mark_edge(panel, lacking, "x", low=True)
+        mark_edge(panel, lacking, marker="x", low=True)
         panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
     if hollow:
         panel.plot([], [], "o", color=BLACK if laws else BLUE, label=_SOME, **HOLLOW)
-    if laws is not None or lacking or hollow:
-        names = [*(law for law, _ in groups), *([_NO_VALUE] if lacking else []), *([_SOME] if hollow else [])]
+    if laws is not None or without or lacking or hollow:
+        names = [law for law, _ in groups]
+        names += [NO_EXPECTATION] * bool(without) + [_NO_VALUE] * bool(lacking) + [_SOME] * bool(hollow)
         title = None if laws is None else name_of(laws)
         figure.legend(loc="outside lower center", title=title, ncols=abreast(names, style))
     said = [_repetitions(found, metric)]
@@ -130,16 +143,21 @@ def cell_lines(
     return figure
 
 
-def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, str]]]) -> None:
-    """Write numbers at their places along the upper edge, a row for each colour, above all marks."""
+def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, str]]]) -> float:
+    """Write numbers at their places along the upper edge, a row for each colour, above all marks.
+
+    Returns the share of the height that they take.
+    """
     step = min(ROW, 0.4 / len(numbers))
-    make_room(panel, step * (len(numbers) + 0.5))
+    taken = step * (len(numbers) + 0.5)
+    make_room(panel, taken)
     for row, (color, counts) in enumerate(numbers.items()):
         for at, count in counts:
             panel.text(
                 at, 1.0 - (row + 0.5) * step, count, color=color, ha="center", va="center", fontsize="x-small",
                 transform=panel.get_xaxis_transform(),
             )  # fmt: skip
+    return taken
 
 
 def cell_maps(
@@ -157,7 +175,8 @@ def cell_maps(
 
     There is a panel for each value of the `third` axis, numbers or names, such as controllers; and for two names one of
     their difference, with dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs
-    that are both averaged. Of means half of the runs have a value at the line.
+    that are both averaged. Of means half of the runs have a value at the line; those without a finite expectation are
+    hatched, without a colour, and left out of the range of the others.
     """
     x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
     places = (x.edges, y.edges)
@@ -168,6 +187,8 @@ def cell_maps(
         averages = found[names].merge(averages_of(table, names, metric, average), on=names)
         found["value"], found[WITH_VALUE], found["of"] = averages[average], averages[WITH_VALUE], averages["count"]
         absent = left_out(averages, words[0])
+    found["without"] = averages[REMARK].eq(NO_EXPECTATION) if average == MEAN else False
+    found["value"] = found["value"].mask(found["without"])
     groups = _by_value(found, third, units)
     both = _two_laws(third)
     count = len(groups) + (both is not None)
@@ -178,15 +199,17 @@ def cell_maps(
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel in panels[count:]:
         panel.set_visible(False)
-    grids = [{name: _grid(group, axes, name) for name in ("value", "share")} for _, group in groups]
+    grids = [{name: _grid(group, axes, name) for name in ("value", "share", "without")} for _, group in groups]
     everything = np.stack([grid["value"] for grid in grids])
     letters = letters_of(style, columns)
     room, most = letters / (len(places[0]) - 1), found["count"].max()
     has_room = {form: len(form.format(most, most)) + 1 <= room for form in (OF_ALL, ALONE, MARKED)}
     writes, repeats = has_room[ALONE], most > 1
     for panel, (law, group), grid in zip(panels, groups, grids):
-        filled = _fill(panel, places, grid["value"], everything, metric)
+        how = {"norm": Normalize(0.0, 1.0), "vmin": None} if metric == GOOD else {"of": everything}
+        filled = mesh.fill(panel, *places, grid["value"], **how)
         mesh.hatch(panel, *places, np.isnan(grid["share"]))
+        mesh.hatch(panel, *places, grid["without"] > 0.0, mesh.NO_MEAN)
         _limit(panel, places, grid["share"])
         if metric == GOOD and writes:
             at, up = (quantity.of(group[axis.name]) for quantity, axis in zip((x, y), axes))
@@ -196,13 +219,17 @@ def cell_maps(
             texts = _numbers(valued, valued["of" if has_room[OF_ALL] else WITH_VALUE])
             _write_numbers(panel, (x, y), axes, texts, 0.0)
         panel.set_title(law or "")
-    empty = [np.where(np.isnan(grid["value"]) & ~np.isnan(grid["share"]), 0.0, np.nan) for grid in grids]
+    empty = [np.where(np.isnan(grid["value"]) & (grid["without"] == 0.0), 0.0, np.nan) for grid in grids]
     for panel, none_good in zip(panels, empty):
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
-    if filled is not None:
-        numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
-        title = _title(metric, words, units, average, numbered=numbered, repeats=repeats)
-        figure.colorbar(filled, ax=panels[: len(groups)].tolist(), label=title, location="bottom", aspect=40.0)
+    numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
+    title = _title(metric, words, units, average, numbered=numbered, repeats=repeats)
+    title += (
+        f",\n{found['without'].sum()} cells without a finite expectation left out" if found["without"].any() else ""
+    )
+    if np.isfinite(everything).any():
+        range_of = np.array([0.0, 1.0]) if metric == GOOD else everything
+        mesh.color_bar(panels[: len(groups)].tolist(), filled, range_of, title, location="bottom", aspect=40.0)
     if both is not None:
         of_pairs, of = differences_in(table, names, both, metric, average), "difference of the shares"
         if metric != GOOD:
@@ -240,6 +267,8 @@ def cell_maps(
         handles.append(Patch(color=NOT_GOOD, label=f"{label}, or no value" if absent and average == MEDIAN else label))
     if any(np.isnan(grid["share"]).any() for grid in grids):
         handles.append(mesh.hatched())
+    if found["without"].any():
+        handles.append(mesh.hatched(NO_EXPECTATION, mesh.NO_MEAN))
     if both is not None and unpaired:
         handles.append(mesh.hatched("no pairs", mesh.NO_PAIRS))
     if handles:
@@ -295,14 +324,6 @@ def _grid(table: "pd.DataFrame", axes: tuple[Axis, Axis], column: str) -> Floats
     shape = table.pivot(index=axes[1].name, columns=axes[0].name, values=column)
     whole = shape.reindex(index=sorted(axes[1].values or ()), columns=sorted(axes[0].values or ()))
     return np.asarray(whole.to_numpy(float))
-
-
-def _fill(panel: Axes, places: tuple[Floats, Floats], values: Floats, everything: Floats, metric: str) -> Any:
-    """Colour the cells of a panel with the range of all panels; None if nothing has a value."""
-    if not np.isfinite(everything).any():
-        return None
-    ends = (0.0, 1.0) if metric == GOOD else (float(np.nanmin(everything)), float(np.nanmax(everything)))
-    return mesh.fill(panel, *places, values, norm=Normalize(*ends), vmin=None)
 
 
 def _limit(panel: Axes, places: tuple[Floats, Floats], share: Floats) -> None:
@@ -361,17 +382,23 @@ def _difference(
 
     Returns whether some cells have no difference, which are hatched.
     """
-    difference, is_share = _grid(found, axes, "difference"), "pairs" not in found
-    known = np.abs(difference[np.isfinite(difference)])
-    size = 1.0 if is_share or not known.max(initial=0.0) else float(known.max())
+    is_share = "pairs" not in found
+    found = found.assign(without=found[REMARK].eq(NO_EXPECTATION) if REMARK in found else False)
+    without = _grid(found, axes, "without") > 0.0
+    mesh.hatch(panel, *places, without, mesh.NO_MEAN)
+    found["difference"] = found["difference"].mask(found["without"])
+    difference = _grid(found, axes, "difference")
+    known = np.sort(np.abs(difference[np.isfinite(difference)]))
+    size = 1.0 if is_share or not known.max(initial=0.0) else float(known[inner(known)[1]]) or float(known[-1])
     filled = mesh.fill(panel, *places, difference, cmap="RdBu", norm=Normalize(-size, size), vmin=None)
-    unknown = np.isnan(difference)
+    unknown = np.isnan(difference) & ~without
     mesh.hatch(panel, *places, unknown, mesh.NO_PAIRS)
-    figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85)
+    beyond = "both" if known.max(initial=0.0) > size else "neither"
+    figure.colorbar(filled, ax=panel, label=of, location="bottom", aspect=20.0, shrink=0.85, extend=beyond)
     aside = BESIDE if not is_share and writes else 2.5
     marks = (found["low"] > 0.0) | (found["high"] < 0.0)
     for row, is_marked in zip(found.to_dict("records"), marks):  # the sign, which colours do not show in grey
-        if row["difference"]:
+        if row["difference"] and not row["without"]:
             is_alone = not is_marked and (is_share or not writes)
             x, y = (float(quantity.of(row[axis.name])) for axis, quantity in zip(axes, quantities))
             color = "white" if abs(row["difference"]) > HALF * size else BLACK

@@ -9,15 +9,16 @@ from matplotlib.figure import Figure
 
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
-from orchestration.experiments.studies.axes import Axis, Value, picked, unit_points
+from orchestration.experiments.studies.axes import Axis, Value, picked, place_of, unit_points
 from orchestration.experiments.studies.cell_figures import MAX_PANELS, cell_lines, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
+from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.experiments.studies.shares import BOOLEAN, GOOD, MEAN, MEDIAN, expect_mean, judged_by, with_chance
 from orchestration.experiments.studies.store import store_path
 from orchestration.experiments.studies.store_columns import TEXTS, metrics_with
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.table import frame, meaning_of, place_of, rows_at, units_in
+from orchestration.experiments.studies.table import frame, meaning_of, rows_at, units_in
 from orchestration.foundation.basics.errors import UsageError, did_you_mean
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.terminal import Share
@@ -97,9 +98,10 @@ def study_figures(
             drawn = {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}
         else:
             axes = tuple(axis for axis in study.cell_axes if axis.name not in at)
-            drawn = _over_axes(study, axes, table, metric, units, style, MEAN if mean else MEDIAN)
+            infinite = InfiniteMeans.in_store(store) if mean else None
+            drawn = _over_axes(study, axes, table, metric, units, style, MEAN if mean else MEDIAN, infinite)
         meaning = "" if study.repeat is None or mean else meaning_of(study, metric, units)
-        notes = [place_of(study, at, units), meaning]
+        notes = [place_of(study.axes, at, units), meaning]
         for figure in drawn.values():
             figures.add_note(figure, "; ".join(filter(None, notes)), style)
     return drawn, indices
@@ -113,6 +115,7 @@ def _over_axes(
     units: Mapping[str, str],
     style: Style,
     average: str,
+    infinite: InfiniteMeans | None,
 ) -> dict[str, Figure]:
     system = study.origin
     words = system.criterion.outcomes
@@ -129,7 +132,7 @@ def _over_axes(
                 "of an axis, export --table prints them over any axes with values, report shows all runs, and compare "
                 "draws shares over random initial conditions"
             )
-        panels, table, of = third[0] if third else None, with_chance(table, study), metric
+        panels, table, of = third[0] if third else None, with_chance(table, study, infinite), metric
         if metric in BOOLEAN:
             table, of = judged_by(table, metric), GOOD
             words = words if metric == GOOD else (labels.metric(metric), f"not {labels.metric(metric)}")

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -76,7 +76,7 @@ def lines(
             edge, color=RED, linewidth=0.8, linestyle="--", label=f"{words[0]} up to {edge:g}{after(units.get(metric))}"
         )
     if places := {color: at for color, at in diverged.items() if len(at)}:
-        mark_edge(panel, places, "^")
+        mark_edge(panel, places, marker="^")
     plain(panel.xaxis)
     plain(panel.yaxis)
     handles, names = panel.get_legend_handles_labels()
@@ -84,14 +84,26 @@ def lines(
     return figure
 
 
-def mark_edge(panel: Axes, places: Mapping[str | tuple[float, ...], Floats], mark: str, *, low: bool = False) -> None:
-    """Marks along the upper edge, or the lower, in a row for each colour, beyond all other marks."""
-    step = min(0.022, 0.25 / len(places))
+def mark_edge(
+    panel: Axes,
+    places: Mapping[str | tuple[float, ...], Floats],
+    *,
+    low: bool = False,
+    beside: float = 0.0,
+    **look: Any,
+) -> None:
+    """Marks along the upper edge, or the lower, in a row for each colour, beyond all other marks.
+
+    They leave a share of the height `beside` the edge to what stands there.
+    """
+    look = {"markersize": 4.0, **look}
+    step = min(0.0055 * look["markersize"], 0.25 / len(places))
     make_room(panel, step * (len(places) + 1), low=low)
     for row, (color, at) in enumerate(places.items(), start=1):
-        height = row * step if low else 1.0 - row * step
+        height = beside + row * step
         across = panel.get_xaxis_transform()
-        panel.plot(at, np.full(len(at), height), mark, color=color, markersize=4, transform=across)
+        where = np.full(len(at), height if low else 1.0 - height)
+        panel.plot(at, where, linestyle="", color=color, transform=across, **look)
 
 
 def make_room(panel: Axes, share: float, *, low: bool = False) -> None:
@@ -242,7 +254,7 @@ def heat_map(
     panel.set(xlabel=across.title, ylabel=up.title, xscale=SCALES[axes[0].scale], yscale=SCALES[axes[1].scale])
     cells.name_cells(panel, *(each.of(np.unique(coded[axis.name])) for axis, each in zip(axes, (across, up))))
     named = labels.metric_with_unit(metric, units.get(metric))
-    cells.color_bar(panel, mesh, shown, f"{named}, where {words[valued]}")
+    cells.color_bar([panel], mesh, shown, f"{named}, where {words[valued]}")
     outcomes = {*table["outcome"].dropna()}
     bad = " or ".join(word for word in (words[1], TERMINATED) if word in outcomes)
     shade = matplotlib.colormaps[SHADES](0.5)

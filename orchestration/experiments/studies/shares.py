@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.statistics import mean, pair_correlation, quantile, wilson
@@ -27,6 +28,10 @@ PLACE = "place"
 """Column of one value, by which runs over laws alone are one group"""
 RANDOM = "random"
 """Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
+WITHOUT = "without a finite expectation"
+"""Column of a table of runs: the metrics whose mean has no finite expectation, in a tuple"""
+REMARK, NO_EXPECTATION = "remark", "no finite expectation"
+"""Column of means: why they have no interval, and what it says of such a mean; else empty"""
 PAIR = "paired by"
 """Column of a table of runs: what runs of two cells that belong together have in common, as the seed"""
 
@@ -39,9 +44,10 @@ class TwoLaws(NamedTuple):
     second: str
 
 
-def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
-    """The table of the runs of `study` with the columns `RANDOM` and `PAIR`.
+def with_chance(table: "pd.DataFrame", study: Study, infinite: InfiniteMeans | None = None) -> "pd.DataFrame":
+    """The table of the runs of `study` with the columns `RANDOM`, `PAIR` and `WITHOUT`.
 
+    `WITHOUT` has metrics at the points of `infinite`.
     `RANDOM` is false in a cell whose system does not depend on the seed, if only the seed is repeated.
     """
     starts = study.files().start_values if study.needs_start_values else {}
@@ -52,7 +58,8 @@ def with_chance(table: "pd.DataFrame", study: Study) -> "pd.DataFrame":
 
     cells = table.groupby([axis.name for axis in study.cell_axes], dropna=False)["design_index"]
     repeated = 0 if study.repeat is None else table[study.repeat]
-    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool), PAIR: repeated})
+    without: Any = "" if infinite is None else infinite.column(table)
+    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool), PAIR: repeated, WITHOUT: without})
 
 
 def judged_by(table: "pd.DataFrame", metric: str) -> "pd.DataFrame":
@@ -180,7 +187,8 @@ def averages_of(table: "pd.DataFrame", by: Sequence[str], metric: str, average: 
 
     Columns: the axes `by`, `count` of runs, also failed ones, `diverged` and `good` of them (for the mean those that
     have it), `with_value`, the number of those averaged, `median` or `mean`, and the ends of its interval at 95 %, of
-    order statistics or Student's t, nan where there are too few runs, and where nothing is random, which is one run.
+    order statistics or Student's t, nan where there are too few runs, and where nothing is random, which is one run;
+    of means `remark`, which says where they have no finite expectation, and no interval.
     """
     import pandas as pd
 
@@ -192,8 +200,9 @@ def averages_of(table: "pd.DataFrame", by: Sequence[str], metric: str, average: 
         values, is_random = cell.loc[cell["averaged"], metric], bool(cell[RANDOM].any())
         counts = [len(cell), int(cell["diverged"].fillna(False).sum()), len(values)]
         counts = counts if is_random else [min(1, each) for each in counts]
-        rows.append((*key, *counts, *_average(values.dropna(), average, is_random=is_random)))
-    return pd.DataFrame(rows, columns=[*by, "count", "diverged", GOOD, WITH_VALUE, average, "low", "high"])
+        rows.append((*key, *counts, *_average(values.dropna(), average, is_random=is_random), _remark(cell, metric)))
+    columns = [*by, "count", "diverged", GOOD, WITH_VALUE, average, "low", "high", REMARK]
+    return _with_remarks(pd.DataFrame(rows, columns=columns), average)
 
 
 def left_out(averages: "pd.DataFrame", word: str) -> str:
@@ -225,19 +234,32 @@ def differences_of_averages(
 
     Pairs are those in which both are good, for the mean those in which both have the metric. Columns: the other axes,
     `pairs`, their number, `difference`, and its interval at 95 %, `low` and `high`, nan where there are too few pairs,
-    and where nothing is random, which is one pair.
+    and where nothing is random, which is one pair; of means `remark`, if one of both has no finite expectation.
     """
     import pandas as pd
 
     others = [name for name in by if name != laws.axis]
     judged = table if average == MEDIAN else judged_by(table, metric)
     good = _judged(judged).query(GOOD).dropna(subset=[metric])
-    columns, rows = [*others, PAIR, metric, RANDOM], []
+    columns, rows = [*others, PAIR, metric, RANDOM, WITHOUT], []
     one, other = (good.loc[good[laws.axis] == law, columns] for law in (laws.second, laws.first))
     for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others, sort=False):
         is_random = bool((both[RANDOM] | both[f"{RANDOM}.other"]).any())
-        rows.append((*key, *_average(both[metric] - both[f"{metric}.other"], average, is_random=is_random)))
-    return pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high"])
+        remark = _remark(both, metric) or _remark(both, metric, f"{WITHOUT}.other")
+        rows.append((*key, *_average(both[metric] - both[f"{metric}.other"], average, is_random=is_random), remark))
+    return _with_remarks(pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high", REMARK]), average)
+
+
+def _remark(cell: "pd.DataFrame", metric: str, column: str = WITHOUT) -> str:
+    return NO_EXPECTATION if any(metric in each for each in cell[column]) else ""
+
+
+def _with_remarks(cells: "pd.DataFrame", average: str) -> "pd.DataFrame":
+    """The cells without intervals where a remark says so; medians always have one, and no remarks."""
+    if average == MEDIAN:
+        return cells.drop(columns=REMARK)
+    cells.loc[cells[REMARK] != "", ["low", "high"]] = math.nan
+    return cells
 
 
 def _correlations(table: "pd.DataFrame", others: list[str], laws: TwoLaws) -> dict[tuple[Any, ...], float]:

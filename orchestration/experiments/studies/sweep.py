@@ -16,6 +16,7 @@ from fmu_kit.new_files import write_atomically
 from orchestration.components.building.fmus import native_twin
 from orchestration.experiments.studies import store
 from orchestration.experiments.studies.checks import Checked, check_design, describe_run
+from orchestration.experiments.studies.infinite_means import INFINITE, InfiniteMeans
 from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
 from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
 from orchestration.experiments.studies.run_key import CONTENT, design_parts, difference, place_parts, study_parts
@@ -27,7 +28,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.terminal import Count, CountProgress, inform, runs_reporter
+from orchestration.foundation.basics.terminal import Count, CountProgress, inform, runs_reporter, warn
 from orchestration.simulation.engines.master import Engine
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
@@ -112,7 +113,13 @@ def sweep(
             execution = execution.as_before(before, str(path), "another one needs another folder, --out")
         all_files = with_python_twins(files) if execution.in_lanes else files
         reached = None if dask is None else stack.enter_context(cluster(Inputs.of(all_files), dask))
+        known = opened.about().get(INFINITE) if _is_described(opened, columns) else None
         _describe(opened, columns)  # last, so that what is refused changes nothing
+        infinite = InfiniteMeans.of(study, files) if known is None else InfiniteMeans.from_text(known)
+        if known is None:
+            opened.describe({INFINITE: infinite.as_text()})
+        if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
+            warn(warning)
         missing = _missing(opened, study, retry_failed)
         sweep_progress = _Progress(study, missing, report, announce)
         agreement = None
@@ -151,7 +158,7 @@ def sweep(
         failed, engines = opened.counts().get("failed", 0), opened.engines()
     return Swept(
         study=study, total=len(study.points), flown=len(missing), failed=failed, path=path, engine=execution.name,
-        engines=engines, agreement=agreement, follows=follows,
+        engines=engines, agreement=agreement, follows=follows, infinite_means=infinite,
     )  # fmt: skip
 
 
@@ -309,12 +316,21 @@ def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
         )
 
 
+def _is_described(opened: store.Store, columns: RunColumns) -> bool:
+    """Whether the store has this design, of these files."""
+    about, (design, place) = opened.about(), _parts(columns)
+    return (about.get(DESIGN_PARTS), about.get(PLACE_PARTS)) == (design, place)
+
+
+def _parts(columns: RunColumns) -> tuple[str, str]:
+    return json.dumps(design_parts(columns.study)), json.dumps(place_parts(columns.study, columns.files))
+
+
 def _describe(opened: store.Store, columns: RunColumns) -> None:
     """Describe the study and its design in its store."""
     study, files = columns.study, columns.files
-    design, place = json.dumps(design_parts(study)), json.dumps(place_parts(study, files))
-    about = opened.about()
-    if (about.get(DESIGN_PARTS), about.get(PLACE_PARTS)) == (design, place):
+    design, place = _parts(columns)
+    if _is_described(opened, columns):
         return
     grid: dict[str, Any] | None = {axis.name: axis.values for axis in study.axes}
     opened.describe(

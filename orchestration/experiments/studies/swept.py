@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
@@ -42,6 +43,9 @@ class Swept:
     """Agreement of runs in SIMD lanes with the same runs by FMUs; None if there were none."""
     follows: tuple[str, ...] = ()
     """The references of its runs and the components that follow them."""
+
+    infinite_means: InfiniteMeans | None = None
+    """The points at which averages over runs have no finite expectation; their means have no intervals."""
 
     @property
     def verdict(self) -> str:
@@ -123,7 +127,8 @@ class Swept:
         expect_metric_of_cells(self.study, metric)
         if mean:
             expect_mean(metric, self.study.repeat)
-        return with_chance(frame(self.path), self.study), self.study.cell_names or (), metric, MEAN if mean else MEDIAN
+        runs = with_chance(frame(self.path), self.study, self.infinite_means)
+        return runs, self.study.cell_names or (), metric, MEAN if mean else MEDIAN
 
     @explains_missing
     def to_xarray(self) -> "xr.Dataset":

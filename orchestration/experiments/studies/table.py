@@ -12,7 +12,7 @@ from pyarrow import csv
 
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import shares
-from orchestration.experiments.studies.axes import quantity_of
+from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.experiments.studies.store import Store, open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, SETTINGS, TEXTS, UNITS, metrics_with
 from orchestration.experiments.studies.study import Study
@@ -21,7 +21,6 @@ from orchestration.foundation.basics.terminal import inform
 from orchestration.foundation.recording import mat_file
 from orchestration.simulation.results.objectives import criterion_in_words
 from orchestration.simulation.runs.run_directory import MAT, load_run
-from orchestration.systems.system.requirements import is_number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,12 +69,6 @@ def rows_at(table: "pd.DataFrame", at: Mapping[str, Any]) -> "pd.DataFrame":
     for name, value in at.items():
         table = table[table[name] == value]
     return table
-
-
-def place_of(study: Study, at: Mapping[str, Any], units: Mapping[str, str]) -> str:
-    """The values of some axes in words, as "delay 20 ms, loss 0.1"."""
-    known = {axis.name: quantity_of(axis, units) for axis in study.axes if axis.name in at}
-    return ", ".join(f"{known[k].name} {known[k].text_of(v) if is_number(v) else v}" for k, v in at.items())
 
 
 def meaning_of(study: Study, metric: str, units: Mapping[str, str]) -> str:
@@ -167,7 +160,7 @@ def export(
     rows = frame(path) if rows is None else rows
     tables, units = {"runs": rows}, units_in(path)
     if study is not None and study.cell_names is not None:
-        cells, repeated = study.cell_names, shares.with_chance(rows, study)
+        cells, repeated = study.cell_names, shares.with_chance(rows, study, InfiniteMeans.in_store(path))
         laws = shares.laws_of(rows, cells)
         judged = (shares.GOOD,) if study.origin.criterion.good is not None else ()
         for name in dict.fromkeys((*judged, *filter(None, (metric,)))):

@@ -19,8 +19,8 @@ LIMIT = {"colors": RED, "linewidths": 1.8}
 """Style of the line between good and other cells"""
 FEW = 6
 """Most values of an axis that all have a tick"""
-MISSING, NO_PAIRS = "////", "xxx"
-"""Hatches of cells without a run, and without a pair of runs"""
+MISSING, NO_PAIRS, NO_MEAN = "////", "xxx", r"\\\\"
+"""Hatches of cells without a run, without a pair of runs, and without a finite expectation"""
 _HATCHED: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "linewidth": 0.0}
 
 
@@ -35,12 +35,13 @@ def edges(values: Sequence[float] | Floats, *, logarithmic: bool = False) -> Flo
     return np.exp(around) if logarithmic else around
 
 
-def fill(panel: Axes, x: Floats, y: Floats, values: Floats, **how: Any) -> Any:
+def fill(panel: Axes, x: Floats, y: Floats, values: Floats, *, of: Floats | None = None, **how: Any) -> Any:
     """Colour cells between edges `x` and `y` by `values`, shape (rows, columns); none where they are nan.
 
-    The range of the colours is that of `shades_of`, or starts at `vmin`. Returns the mesh for a colour bar.
+    The range of the colours is that of `shades_of` these, or the values `of` all panels, or starts at `vmin`. Returns
+    the mesh for a colour bar.
     """
-    if "vmin" not in how and (shades := shades_of(values)) is not None:
+    if "vmin" not in how and (shades := shades_of(values if of is None else of)) is not None:
         how["norm"] = (LogNorm if shades.logarithmic else Normalize)(shades.low, shades.high)
     panel.grid(False)
     mesh = panel.pcolormesh(
@@ -57,13 +58,14 @@ def name_cells(panel: Axes, x: Floats | None = None, y: Floats | None = None) ->
             axis.set_ticks([*values])
 
 
-def color_bar(panel: Axes, mesh: Any, values: Floats, label: str) -> None:
+def color_bar(panels: Sequence[Axes], mesh: Any, values: Floats, label: str, **how: Any) -> None:
     """Add a colour bar for `values`, with an arrow where some lie beyond; nothing without finite values."""
     shades = shades_of(values)
     if shades is not None:
         ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-        bar = panel.get_figure().colorbar(mesh, ax=panel, label=label, extend=ends[shades.leaves_out])  # type: ignore[union-attr]
-        plain(bar.ax.yaxis)
+        figure = panels[0].get_figure()
+        bar = figure.colorbar(mesh, ax=[*panels], label=label, extend=ends[shades.leaves_out], **how)  # type: ignore[union-attr]
+        plain(bar.ax.yaxis if bar.orientation == "vertical" else bar.ax.xaxis)
 
 
 def fill_kinds(panel: Axes, x: Floats, y: Floats, kinds: Floats, colors: Sequence[str]) -> None:

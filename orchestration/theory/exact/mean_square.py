@@ -1,7 +1,8 @@
 """Infinite mean squares: the value of a random quantity from which on they are, and a warning for such runs."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache
 
 from orchestration.components.fmi.foreign_calls import isolated_call
@@ -12,11 +13,12 @@ from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import changed
+from orchestration.systems.system.paths import at_operating_point, changed
 from orchestration.systems.system.request import Request
-from orchestration.theory.exact.loops import Loops
+from orchestration.theory.exact.loops import Loops, linearised_as
 from orchestration.theory.exact.objectives import inlined_objectives, means_of
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit, rested
+from orchestration.theory.stability.operating_point import periods_of
 from orchestration.theory.stability.sign_changes import zero_between
 
 LIMIT_TOLERANCE = 0.01
@@ -54,41 +56,68 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
 
 SURE_TOLERANCE = 1e-3
 """Difference of a radius allowed from order to order: enough to know whether it is above 1"""
-MAX_SYSTEMS = 50
-"""systems that are examined"""
+MAX_LINEARISED = 50
+"""systems that are linearised: others are examined that differ from them in random times alone"""
 
 
-def infinite_means_warning(request: Request, systems: Sequence[System], files: Files) -> str | None:
-    """A warning about averages over runs of these systems, in one line; None: none is due, or the radius is unknown.
+@dataclass(frozen=True, kw_only=True)
+class MeanSquares:
+    """Whether means of squares have a finite expectation in some systems."""
+
+    radii: Sequence[float | None]
+    """Mean-square radii by system; None: none is examined, or none is known"""
+    left_out: int
+    """number of systems that were too many to be examined"""
+
+    @property
+    def infinite(self) -> list[int]:
+        """The places of systems where they have none."""
+        return [place for place, radius in enumerate(self.radii) if radius is not None and radius >= 1.0]
+
+
+def mean_squares(request: Request, systems: Sequence[System], files: Files) -> MeanSquares:
+    """Examine the means of squares of these systems.
 
     Examined are systems with something random and an objective that is a mean of squares, unless their kind has its
     own loop: those are not linear where they run.
     """
-    if request.kind in LOOPS:
-        return None
+    places: dict[str, list[int]] = {}
     chosen: dict[str, System] = {}
-    for system in systems:
-        if len(chosen) < MAX_SYSTEMS and system.depends_on_seed and _averages(system):
+    for place, system in enumerate(systems) if request.kind not in LOOPS else ():
+        if system.depends_on_seed and averages_of(system):
             once = replace(system, seed=0)
-            chosen.setdefault(once.to_toml(), once)
-    if not chosen:
-        return None
+            chosen.setdefault(key := once.to_toml(), once)
+            places.setdefault(key, []).append(place)
+    linear = {key: _linearised_as(system) for key, system in chosen.items()}
+    first = {*list(dict.fromkeys(linear.values()))[:MAX_LINEARISED]}
+    keys = [key for key in chosen if linear[key] in first]
+    radii: list[float | None] = [None] * len(systems)
+    with suppress(QuadcosimError):
+        examined = [chosen[key] for key in keys]
+        found = isolated_call(files.fmus.values(), radii_of, examined, files.models) if keys else []
+        for key, radius in zip(keys, found):
+            for place in places[key]:
+                radii[place] = radius
+    return MeanSquares(radii=radii, left_out=sum(len(places[key]) for key in chosen.keys() - {*keys}))
+
+
+def _linearised_as(system: System) -> str:
+    """What its linearisation depends on; empty for one that has none at its operating point."""
     try:
-        radii = isolated_call(files.fmus.values(), radii_of, [*chosen.values()], files.models)
-    except QuadcosimError:
-        return None
-    above = [radius for radius in radii if radius is not None and radius >= 1.0]
-    if not above:
-        return None
-    where = "" if len(radii) == 1 else f" at {len(above)} of {len(radii)} points"
-    averages = ", ".join(_averages(systems[0]))
+        return linearised_as(at_operating_point(system))
+    except UsageError:
+        return ""
+
+
+def infinite_means(metrics: Iterable[str], where: str, radius: float) -> str:
+    """A warning about averages of these objectives over runs, in one line; `where` as " at 1 of 2 points"."""
     return (
-        f"{averages}: without a finite expectation{where}, so an average over runs means nothing; "
-        f"the mean-square radius is {max(above):.6g} (quadcosim expect)"
+        f"{', '.join(metrics)}: without a finite expectation{where}, so an average over runs means nothing; "
+        f"the mean-square radius is {radius:.6g} (quadcosim expect)"
     )
 
 
-def _averages(system: System) -> list[str]:
+def averages_of(system: System) -> list[str]:
     """The objectives that consist of means."""
     found = []
     for name, node in inlined_objectives(system.objectives).items():
@@ -101,13 +130,16 @@ def _averages(system: System) -> list[str]:
 
 
 def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[float | None]:
-    """The mean-square radii of systems; None for one that is not linear about a rest, or too large."""
-    loops, found = Loops(models), list[float | None]()
+    """The mean-square radii of systems; None for one that is not linear about a rest, or too large.
+
+    Those of long periods come first: what is measured over a long one holds over shorter ones.
+    """
+    loops, found = Loops(models, nearly=True), dict[int, float | None]()
     with progress_bar("means of squares") as report:
-        for i, system in enumerate(systems):
-            report(i / len(systems))
+        for place in sorted(range(len(systems)), key=lambda place: -max(periods_of(systems[place]), default=0)):
+            report(len(found) / len(systems))
             try:
-                found.append(loops.radius(system, agree=SURE_TOLERANCE))
+                found[place] = loops.radius(systems[place], agree=SURE_TOLERANCE)
             except QuadcosimError:
-                found.append(None)
-    return found
+                found[place] = None
+    return [found[place] for place in range(len(systems))]

@@ -21,6 +21,7 @@ from orchestration.experiments.studies import cell_figures, drawing
 from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
 from orchestration.experiments.studies.shares import (
     PAIR,
+    WITHOUT,
     TwoLaws,
     averages_of,
     differences_in,
@@ -54,7 +55,8 @@ def runs() -> pd.DataFrame:
     rows = [
         {
             "controller": law, "timing.period": period, "timing.loss": loss, "seed": seed, "status": "done",
-            "random": True, PAIR: seed, "diverged": False, "good": first or (period < 0.02 and seed < 3 * k),
+            "random": True, WITHOUT: "", PAIR: seed, "diverged": False,
+            "good": first or (period < 0.02 and seed < 3 * k),
             "position_rmse": 1.0 + seed,
         }
         for law, first in zip(LAWS.values or (), (True, False))
@@ -129,10 +131,11 @@ def test_a_mean_is_over_all_runs_with_a_value_and_marks_where_some_are_left_out(
     assert means.loc[laws.first, 0.0][["low", "high"]].tolist() == pytest.approx([2.5 - half, 2.5 + half])
     assert means.loc[laws.first, 0.1][["count", "diverged", "with_value", "mean"]].tolist() == [4, 1, 3, 2.0]
     pairs = differences_in(table, names, laws, "position_rmse", "mean").set_index("timing.loss")
-    assert pairs.loc[0.0].tolist() == pytest.approx([4, 2.5, 2.5 - half, 2.5 + half])
+    numbers = ["pairs", "difference", "low", "high"]
+    assert pairs.loc[0.0, numbers].tolist() == pytest.approx([4, 2.5, 2.5 - half, 2.5 + half])
     assert pairs.loc[0.1, ["pairs", "difference"]].tolist() == [3, 2.0]
     alone = differences_in(table, names[:1], laws, "position_rmse", "mean")  # PAIR: seeds of all losses
-    assert alone.columns.tolist() == ["pairs", "difference", "low", "high"]
+    assert alone.columns.tolist() == [*numbers, "remark"]
     figure = cell_lines(table, LOSSES, LAWS, "position_rmse", WORDS, units={}, average="mean")
     assert "; 2 of 24 runs left out (without a value), all of them diverged" in figure.get_suptitle().replace("\n", " ")
     hollow = [line for line in figure.axes[0].get_lines() if line.get_markerfacecolor() == "white"]
@@ -142,6 +145,34 @@ def test_a_mean_is_over_all_runs_with_a_value_and_marks_where_some_are_left_out(
     assert [text.get_text() for text in figure.axes[0].texts] == ["4", "3/4", "4"]
     with pytest.raises(UsageError, match="mean: expected a metric that is a number"):
         expect_mean("good", "seed")
+
+
+def test_a_mean_without_a_finite_expectation_has_no_interval_no_dot_and_no_colour() -> None:
+    names, laws = ["controller", "timing.period", "timing.loss"], TwoLaws("controller", *map(str, LAWS.values or ()))
+    table, metric = runs(), "position_rmse"
+    is_second = table["controller"] == laws.second
+    at = is_second & (table["timing.loss"] == 0.2)
+    table[WITHOUT] = pd.Series([(metric,) if each else () for each in at], index=table.index, dtype=object)
+    table[metric] += 10.0 * is_second + 1e6 * at
+    means = averages_of(table, names, metric, "mean").set_index(names)
+    infinite = means["remark"] == "no finite expectation"
+    assert means.index[infinite].tolist() == [(laws.second, period, 0.2) for period in (0.01, 0.02)]
+    assert (means[["low", "high"]].isna().all(axis=1) == infinite).all()
+    assert averages_of(table, names, metric)["low"].notna().any(), "a median always has an interval"
+    found = differences_in(table, names, laws, metric, "mean").set_index("timing.loss")
+    assert found["low"].isna().tolist() == (found["remark"] != "").tolist() == [False, False, True] * 2
+    figure = cell_maps(table, (PERIODS, LOSSES), LAWS, metric, WORDS, units={}, average="mean")
+    bar = next(each for each in figure.axes if "2 cells without a finite expectation left out" in each.get_xlabel())
+    assert bar.get_xlim()[1] < 20.0, "the others have all of its colours"
+    dots = [line for line in figure.axes[2].get_lines() if line.get_marker() == "o"]
+    assert [sorted({*np.asarray(line.get_ydata()).tolist()}) for line in dots] == [[0.0, 0.1]]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["no finite expectation"]
+    figure = cell_lines(table.query("`timing.period` == 0.01"), LOSSES, LAWS, metric, WORDS, units={}, average="mean")
+    panel = figure.axes[0]
+    marks = [line for line in panel.get_lines() if line.get_marker() == "$\\infty$"]
+    assert [np.asarray(line.get_xdata()).tolist() for line in marks] == [[0.2], []]
+    assert panel.get_ylim()[1] < 30.0
+    assert "no finite expectation" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def crosses_of(figure: Figure) -> list[float]:

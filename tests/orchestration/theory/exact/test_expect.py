@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.foundation.basics.bisection import Range
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
@@ -30,6 +31,7 @@ from orchestration.theory.exact.loops import Loops, expect_same_steps
 from orchestration.theory.exact.objectives import means_of
 from orchestration.theory.exact.random_times import CERTAIN, RandomLink, RandomTime, SampledTask, exact_seconds
 from orchestration.theory.exact.timing import sampled_tasks
+from orchestration.theory.stability import loop_at_rest
 from orchestration.theory.stability.matrices import SampledSystem
 from quadcosim import UsageError, limit
 from tests.commands import Main
@@ -140,9 +142,11 @@ def test_a_loop_with_too_many_fourth_moments_says_so(monkeypatch: pytest.MonkeyP
 
 def test_radii_of_many_systems_show_how_far_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     shares = list[float]()
-    monkeypatch.setattr(mean_square, "Loops", lambda _: SimpleNamespace(radius=lambda _, agree: agree))
+    monkeypatch.setattr(mean_square, "Loops", lambda _, nearly: SimpleNamespace(radius=lambda _, agree: agree))
     monkeypatch.setattr(mean_square, "progress_bar", lambda _: nullcontext(shares.append))
-    assert mean_square.radii_of(cast("Any", [None, None]), {}) == [mean_square.SURE_TOLERANCE] * 2
+    assert (
+        mean_square.radii_of(cast("Any", [SimpleNamespace(components={})] * 2), {}) == [mean_square.SURE_TOLERANCE] * 2
+    )
     assert shares == [0.0, 0.5]
 
 
@@ -257,8 +261,8 @@ def test_a_run_says_that_its_averages_mean_nothing(main: Main) -> None:
     assert NO_END not in main("run", path, "--set", "stop_time=20", "--set", f"{loss}=0.2").stderr
 
 
-def test_a_sweep_says_at_how_many_points(main: Main, tmp_path: Path) -> None:
-    study = tmp_path / "study.toml"
+def test_a_sweep_names_the_points_and_their_means_have_no_interval(main: Main, tmp_path: Path) -> None:
+    study, store = tmp_path / "study.toml", tmp_path / "store"
     study.write_text(
         f"""
 name = "losses"
@@ -271,9 +275,48 @@ values = [0.1, 0.2, 0.3]
 name = "length"
 sets = ["stop_time"]
 values = [5.0]
+[[axes]]
+name = "seed"
+values = [1, 2]
+[design]
+repeat = "seed"
 """
     )
-    assert f"{NO_END} at 1 of 3 points" in main("sweep", study, "--out", tmp_path / "store").stderr
+    told = f"{NO_END} at 1 of 3 points (loss 0.3, length 5 s), so an average over runs means nothing"
+    assert told in main("sweep", study, "--out", store).stderr
+    printed = main("export", study, "--store", store, "--metric", "variance", "--mean", "--table", "markdown").stdout
+    assert [line.count("no finite expectation") for line in printed.splitlines()[2:5]] == [0, 0, 1]
+    found = InfiniteMeans.in_store(store / "study.sqlite")
+    assert found is not None
+    assert (found.points, found.total, found.left_out) == (((0.3, 5.0),), 3, 0)
+
+
+def test_a_plant_is_measured_once_for_shorter_periods_to_the_accuracy_of_a_radius(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    systems = [
+        example("minimum_variance", {"components.controller.sampling.period": period, "connections.command.loss": loss})
+        for period, loss in ((0.5, 0.1), (1.0, 0.1), (1.0, 0.3))
+    ]
+    models, measured = files_of(systems[0]).models, list[float]()
+    exact = [Loops(models).radius(system, agree=mean_square.SURE_TOLERANCE) for system in systems]
+    of = loop_at_rest.in_continuous_time
+    monkeypatch.setattr(loop_at_rest, "in_continuous_time", lambda *a, **b: measured.append(a[1]) or of(*a, **b))
+    assert mean_square.radii_of(systems, models) == pytest.approx(exact, rel=1e-6)
+    assert measured == [1.0]
+
+
+def test_what_is_too_much_to_linearise_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mean_square, "MAX_LINEARISED", 1)
+    monkeypatch.setattr(mean_square, "radii_of", lambda systems, models: [2.0] * len(systems))
+    changes = [
+        {"connections.command.loss": loss, "components.controller.parameters.gain": gain}
+        for gain in (1.0, 1.2)
+        for loss in (0.1, 0.2)
+    ]
+    systems = [example("minimum_variance", each) for each in changes]
+    found = mean_square.mean_squares(systems[0], systems, files_of(systems[0]))
+    assert (found.radii, found.infinite, found.left_out) == ([2.0, 2.0, None, None], [0, 1], 2)
 
 
 @needs_compiler
