@@ -56,7 +56,7 @@ def sweep(
     for each in summary.follows:
         inform(f"follows {each}")
     _tell_if_undecided(summary.study, summary.outcomes)
-    keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows")
+    keys = ("total", "flown", "failed", "path", "engine", "engines", "agreement", "follows", "infinite_means")
     document = {name: getattr(summary, name) for name in keys}
     return CommandResult(document=document, verdict=summary.verdict, lines=lines, good=not summary.failed)
 

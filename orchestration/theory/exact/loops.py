@@ -116,7 +116,13 @@ class Loops:
         key = linearised_as(*(x for x in (system, initial) if x))
         system, initial = without_scheduler(system), None if initial is None else without_scheduler(initial)
         if key not in self._known:
-            self._known[key] = self._linearised(system, initial)
+            try:
+                self._known[key] = self._linearised(system, initial)
+            except UsageError:
+                if not self._tangents:
+                    raise
+                self._tangents, self._identifier = KnownTangents(), ComponentIdentifier()  # none of other systems
+                self._known[key] = self._linearised(system, initial)
         return self._known[key]
 
     def _linearised(self, system: System, initial: System | None) -> Linear:

@@ -31,7 +31,9 @@ from orchestration.theory.exact.loops import Loops, expect_same_steps
 from orchestration.theory.exact.objectives import means_of
 from orchestration.theory.exact.random_times import CERTAIN, RandomLink, RandomTime, SampledTask, exact_seconds
 from orchestration.theory.exact.timing import sampled_tasks
-from orchestration.theory.stability import loop_at_rest
+from orchestration.theory.stability.excitation import Rest
+from orchestration.theory.stability.identification import in_continuous_time
+from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.matrices import SampledSystem
 from quadcosim import UsageError, limit
 from tests.commands import Main
@@ -300,10 +302,27 @@ def test_a_plant_is_measured_once_for_shorter_periods_to_the_accuracy_of_a_radiu
     ]
     models, measured = files_of(systems[0]).models, list[float]()
     exact = [Loops(models).radius(system, agree=mean_square.SURE_TOLERANCE) for system in systems]
-    of = loop_at_rest.in_continuous_time
-    monkeypatch.setattr(loop_at_rest, "in_continuous_time", lambda *a, **b: measured.append(a[1]) or of(*a, **b))
+
+    def counted(rest: Rest, period: float, step: float, *, unit: float | None) -> Tangent:
+        measured.append(period)
+        return in_continuous_time(rest, period, step, unit=unit)
+
+    monkeypatch.setattr("orchestration.theory.stability.loop_at_rest.in_continuous_time", counted)
     assert mean_square.radii_of(systems, models) == pytest.approx(exact, rel=1e-6)
     assert measured == [1.0]
+
+
+def test_what_fails_with_a_component_as_in_other_systems_is_measured_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    def linearised(loops: Loops, *_: object) -> str:
+        if loops._tangents:
+            raise UsageError("not precise enough")
+        return "anew"
+
+    monkeypatch.setattr(Loops, "_linearised", linearised)
+    loops = Loops({}, nearly=True)
+    assert loops._tangents is not None
+    loops._tangents["plant"] = cast("Any", None)
+    assert loops.linear(example("minimum_variance")) == cast("Any", "anew")
 
 
 def test_what_is_too_much_to_linearise_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
