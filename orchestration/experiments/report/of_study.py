@@ -170,7 +170,7 @@ def _summary_of_other(name: str, stored: Stored, study: Study | None) -> str:
 
 def _on_means(stored: Stored, study: Study | None) -> str:
     """Where averages over runs have no finite expectation, in a sentence; empty if nowhere, or it is not known."""
-    if study is None or INFINITE not in stored.about:
+    if study is None or not stored.about.get(INFINITE):
         return ""
     warning = InfiniteMeans.from_text(stored.about[INFINITE]).warning(study, stored.units)
     return f" Mind {warning}." if warning else ""

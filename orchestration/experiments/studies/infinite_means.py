@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 INFINITE = "infinite means"
-"""Name of the entry of a store"""
+"""Name of the entry of a store; empty until they are examined"""
 MAX_RUNS, MAX_POINTS = 100_000, 1000
 """Runs of a study that are looked at, and points of them that are examined"""
 NAMED = 3
@@ -76,7 +76,7 @@ class InfiniteMeans:
         """Those of a study by its store; None: they were not examined."""
         with open_for_reading(path) as opened:
             text = opened.about().get(INFINITE)
-        return None if text is None else cls.from_text(text)
+        return cls.from_text(text) if text else None
 
     def warning(self, study: Study, units: Mapping[str, str]) -> str | None:
         """What is to be said of the averages of a study, which names some points; None: nothing."""

@@ -113,14 +113,11 @@ def sweep(
             execution = execution.as_before(before, str(path), "another one needs another folder, --out")
         all_files = with_python_twins(files) if execution.in_lanes else files
         reached = None if dask is None else stack.enter_context(cluster(Inputs.of(all_files), dask))
-        known = opened.about().get(INFINITE) if _is_described(opened, columns) else None
         _describe(opened, columns)  # last, so that what is refused changes nothing
-        infinite = InfiniteMeans.of(study, files) if known is None else InfiniteMeans.from_text(known)
-        if known is None:
-            opened.describe({INFINITE: infinite.as_text()})
+        missing = _missing(opened, study, retry_failed)
+        infinite = _infinite_means(opened, columns)
         if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
             warn(warning)
-        missing = _missing(opened, study, retry_failed)
         sweep_progress = _Progress(study, missing, report, announce)
         agreement = None
         if len(missing):
@@ -316,21 +313,21 @@ def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
         )
 
 
-def _is_described(opened: store.Store, columns: RunColumns) -> bool:
-    """Whether the store has this design, of these files."""
-    about, (design, place) = opened.about(), _parts(columns)
-    return (about.get(DESIGN_PARTS), about.get(PLACE_PARTS)) == (design, place)
-
-
-def _parts(columns: RunColumns) -> tuple[str, str]:
-    return json.dumps(design_parts(columns.study)), json.dumps(place_parts(columns.study, columns.files))
+def _infinite_means(opened: store.Store, columns: RunColumns) -> InfiniteMeans:
+    """The points without a finite expectation, examined once for each design of a store."""
+    known = opened.about()[INFINITE]
+    found = InfiniteMeans.from_text(known) if known else InfiniteMeans.of(columns.study, columns.files)
+    if not known:
+        opened.describe({INFINITE: found.as_text()})
+    return found
 
 
 def _describe(opened: store.Store, columns: RunColumns) -> None:
     """Describe the study and its design in its store."""
     study, files = columns.study, columns.files
-    design, place = _parts(columns)
-    if _is_described(opened, columns):
+    design, place = json.dumps(design_parts(study)), json.dumps(place_parts(study, files))
+    about = opened.about()
+    if (about.get(DESIGN_PARTS), about.get(PLACE_PARTS)) == (design, place) and INFINITE in about:
         return
     grid: dict[str, Any] | None = {axis.name: axis.values for axis in study.axes}
     opened.describe(
@@ -344,6 +341,7 @@ def _describe(opened: store.Store, columns: RunColumns) -> None:
             GUIDS: json.dumps(_guids(study, files)),
             "versions": json.dumps(versions()),
             UNITS: json.dumps(_units(study, files)),
+            INFINITE: "",
         },
         (
             point
