@@ -118,7 +118,7 @@ def limits() -> Found:
         paper = PAPER.with_changes(parameters={"controller.coupling": kappa})
         found = limit.limit(paper, "period", progress=None, announce=None)
         rows.append({"coupling": kappa, "local": found.local_limit, "settles": found.large_signal_limit,
-                     "again": found.flies_above, "note": found.note})  # fmt: skip
+                     "again": found.flies_above, "note": "; ".join(found.notes)})  # fmt: skip
         if kappa == 1.0:
             figure.draw_spectral_radius(paper, found, FIGURES, DOCS)
     return {"limits": rows}

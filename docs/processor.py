@@ -209,8 +209,7 @@ def stalls() -> dict[str, quadcosim.Limit]:
 def stall_table(found: Mapping[str, quadcosim.Limit]) -> list[dict[str, Any]]:
     """For each law, the largest stall that is good [s], and the least that is not, with why."""
     return [
-        {"law": name, "stall": one.large_signal_limit or 0.0, "beyond": one.note.partition(";")[0]}
-        for name, one in found.items()
+        {"law": name, "stall": one.large_signal_limit or 0.0, "beyond": one.notes[0]} for name, one in found.items()
     ]
 
 

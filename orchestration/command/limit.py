@@ -86,4 +86,5 @@ def limit(
     lines = [*in_columns([*texts.items()])]
     if shares := limits.shares_as_text(found):
         lines += ["", *in_columns(shares)]
+    lines += [f"note: {text}" for text in found.notes]
     return CommandResult(document=found, verdict=found.verdict, lines=lines)

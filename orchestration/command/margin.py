@@ -130,7 +130,7 @@ def _of_hover(request: "Request") -> CommandResult:
     from orchestration.quadrotor.scenarios.scenario import Scenario
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
-    from orchestration.theory.stability.known_loops import warn_of_periods
+    from orchestration.theory.stability.known_loops import warned_of_timing
 
     if not isinstance(request, Scenario):
         raise UsageError(
@@ -138,8 +138,8 @@ def _of_hover(request: "Request") -> CommandResult:
             "of gain, phase and a constant delay are those of quadcosim bode"
         )
     files = files_of(system := system_of(request))
-    warn_of_periods(system, files)
-    found = isolated_call(files.fmus.values(), margin_of, request)
+    with warned_of_timing(system, files):
+        found = isolated_call(files.fmus.values(), margin_of, request)
     document, lines = dataclasses.asdict(found), []
     for name, value in ((name, value) for name, value in document.items() if name != "in_double"):  # the verdict has it
         shown = " ".join(f"{share:g}" for share in value) if isinstance(value, tuple) else value

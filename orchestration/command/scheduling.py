@@ -11,7 +11,7 @@ from orchestration.command.flags import assigned
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError, shown
-from orchestration.foundation.basics.terminal import in_columns, inform
+from orchestration.foundation.basics.terminal import in_columns, inform, warn
 from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.figures.names import expect_figure
 
@@ -44,11 +44,14 @@ def schedule(
     if out is not None:
         expect_figure(out)
     from orchestration.simulation.runs import scheduling
+    from orchestration.systems.schedule.overload import overloads_in_words
     from orchestration.systems.system.paths import changed
     from orchestration.systems.system.request import system_of
 
     request = scheduling.request_until(system, until)
-    found = scheduling.schedule(changed(system_of(request), assigned("set", changes)))
+    found = scheduling.schedule(asked := changed(system_of(request), assigned("set", changes)))
+    for text in overloads_in_words([asked]):
+        warn(text)
     if out is not None:
         inform(str(_draw(found, out, start, end)))
     document = {

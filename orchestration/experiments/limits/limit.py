@@ -22,6 +22,7 @@ from orchestration.simulation.results.objectives import bound_of
 from orchestration.simulation.runs.scheduling import schedule
 from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.simulation.workers.executors import RunEvaluator
+from orchestration.systems.schedule.overload import overloads_in_words
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.exact.mean_square import mean_square_limit
@@ -115,7 +116,8 @@ def limit(
     note = [*_note(span, bracket, trials, refuted, local), *_mean_square_note(mean_square, span)]
     note += _own_value_in_words(varied, span, models) if bracket is not None and bracket.good is None else []
     note += _starved(varied, span, scheduled) if local.limit is None else []
-    note += _overloaded(missed_from, local, span)
+    note += _where_missed(missed_from, local, span)
+    note += _overloaded(varied, span, scheduled)
     note += periods_in_words(varied.at(span.last), models, varied.at(values[0]))
     note += kept_periods_in_words(varied.system, varied.at(span.last), models)
     metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
@@ -135,7 +137,7 @@ def limit(
         flies_above=tuple(
             one.value for one in tried if bracket is not None and one.value > bracket.bad and one.flew == seeds
         ),
-        continuous=ideal, tried=tried, note="; ".join(note),
+        continuous=ideal, tried=tried, notes=tuple(note),
     )  # fmt: skip
 
 
@@ -197,7 +199,7 @@ _IN_ITS_UNIT = (
     "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from",
 )  # fmt: skip
 """Fields in the unit of the quantity"""
-_HIDDEN = ("unit", "judged_unit", "geometric")
+_HIDDEN = ("unit", "judged_unit", "geometric", "notes")
 
 
 def as_text(limit: Limit) -> dict[str, str]:
@@ -239,9 +241,10 @@ def shares_as_text(limit: Limit) -> list[list[str]]:
 
 def _mean_square_note(found: LinearLimit, span: Range) -> list[str]:
     """The note on the mean-square limit."""
-    if found.limit is not None:
-        return [f"just above {span.text(found.limit)} means of squares have no finite expectation"]
-    return [found.reason] if found.reason else []
+    if found.limit is None:
+        return [found.reason] if found.reason else []
+    further = f", {found.reason}" if found.reason else ""
+    return [f"just above {span.text(found.limit)} means of squares have no finite expectation{further}"]
 
 
 def _refuted(trials: Evaluator, bracket: Bracket | None, above: list[float]) -> float | None:
@@ -313,6 +316,15 @@ def _note(
     return [*parts, f"within a tenth of the local limit of {where}{coarsely}{beyond}"]
 
 
+def _overloaded(varied: Varied, span: Range, values: Sequence[float]) -> list[str]:
+    """The notes on processors that are overloaded at some of these rising values."""
+    over = [value for value in values if overloads_in_words([varied.at(value)])]
+    if not over:
+        return []
+    where = " to ".join(dict.fromkeys(map(span.text, (over[0], over[-1]))))
+    return [f"at {where}: {text}" for text in overloads_in_words([varied.at(value) for value in over])]
+
+
 def _insensitive(tried: Sequence[Evaluation], metric: str | None, unit: str | None) -> list[str]:
     """The note where the judged objective is the same at all of several values, as where nothing moves."""
     first = tried[0].measured
@@ -322,7 +334,7 @@ def _insensitive(tried: Sequence[Evaluation], metric: str | None, unit: str | No
     return [f"{metric} is {same} at each value tried, as where nothing moves: this says nothing of the limit"]
 
 
-def _overloaded(missed_from: float | None, local: LinearLimit, span: Range) -> list[str]:
+def _where_missed(missed_from: float | None, local: LinearLimit, span: Range) -> list[str]:
     """The note on a local limit among values at which deadlines are missed."""
     if missed_from is None or local.limit is None or local.limit < missed_from:
         return []

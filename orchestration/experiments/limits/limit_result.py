@@ -89,8 +89,8 @@ class Limit:
     """The same flight near continuous time; None: not requested."""
     tried: tuple[Evaluation, ...]
     """All evaluated values, in rising order."""
-    note: str
-    """Remarks beyond the verdict, in one sentence."""
+    notes: tuple[str, ...]
+    """Remarks beyond the verdict, a line each."""
 
     @property
     def resolution(self) -> tuple[str, str]:
@@ -149,7 +149,7 @@ class Limit:
         }
         rows = [(name, html.number(value), "" if value is None else self.unit or "") for name, value in limits.items()]
         rows.append(("values tried", str(len(self.tried)), ""))
-        return html.card(f"The limit of {self.of}", None, None, f"{self.verdict}; {self.note}", rows)
+        return html.card(f"The limit of {self.of}", None, None, "; ".join((self.verdict, *self.notes)), rows)
 
     @explains_missing
     def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":

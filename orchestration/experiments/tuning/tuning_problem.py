@@ -15,6 +15,7 @@ from orchestration.simulation.engines.resolved import periods_in_words
 from orchestration.simulation.requests.ranges import Varied, default_quantity, own_value, paths_in
 from orchestration.systems.expressions.over_run import STOP_TIME, TIME
 from orchestration.systems.expressions.syntax import names, parse
+from orchestration.systems.schedule.overload import overloads_in_words
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -166,9 +167,9 @@ class TuningProblem:
             return replace(system, objectives={**system.objectives, COST: self.cost})
 
     def warnings(self, period: float | None) -> list[str]:
-        """A warning for each component whose code believes another period than it has in a search."""
+        """A warning for each component whose code believes another period than it has in a search, and overloads."""
         system = self.system(period, self.values([0.5] * len(self.parameters)))
-        return periods_in_words(system, self.files().models_of(system))
+        return [*periods_in_words(system, self.files().models_of(system)), *overloads_in_words([system])]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,6 +23,7 @@ from orchestration.simulation.results.own_points import points_of
 from orchestration.simulation.results.units import column_infos
 from orchestration.simulation.runs.result import Provenance, Result
 from orchestration.systems.expressions.over_run import Recorded
+from orchestration.systems.schedule.overload import overloads_in_words
 
 _NOTES = logging.getLogger("quadcosim")
 
@@ -111,6 +112,7 @@ def result_of(
             *map(resolved.request.in_own_terms, resolved.system.oversights()),
             *uneven_steps(resolved.system, resolved.models),
             *periods_in_words(resolved.system, resolved.models),
+            *overloads_in_words([resolved.system]),
             *idle_partitions(resolved.system, resolved.models),
             *outcome.warnings,
             *([] if odd is None else [odd]),

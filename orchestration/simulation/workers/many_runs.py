@@ -36,6 +36,7 @@ from orchestration.simulation.workers.executors import expect_workers, local_wor
 from orchestration.simulation.workers.pool import Inputs
 from orchestration.simulation.workers.task import TaskBatch, of_components, rows_of
 from orchestration.systems.expressions.over_run import vectors
+from orchestration.systems.schedule.overload import overloads_in_words
 from orchestration.systems.system.check import check, connect_references, recorded_variables
 from orchestration.systems.system.connection import component_of, variable_of
 from orchestration.systems.system.files import files_of, files_read_by, located
@@ -277,7 +278,7 @@ def _warn_of_mistakes(
     for place in sorted(places.union(first_differences(runs.parameters, parameters))):
         system = runs.alone(place)
         of_model = request.mismatches(numeric_parameters(system, models))
-        if texts := [*of_model, *map(request.in_own_terms, system.oversights())]:
+        if texts := [*of_model, *map(request.in_own_terms, system.oversights()), *overloads_in_words([system])]:
             for text in texts:
                 warn(text)
             return

@@ -12,8 +12,7 @@ from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.bounds import bounds_of
 from orchestration.systems.computers.timeline import ABORTED, NEVER, SKIPPED, Frames, Jobs, Timeline
-from orchestration.systems.system.computers import Message, Task
-from orchestration.systems.system.distribution import mean
+from orchestration.systems.schedule.overload import demand_of, rate_of
 from orchestration.systems.system.frames import frame_nanoseconds
 from orchestration.systems.system.model import System
 
@@ -92,13 +91,14 @@ def responses_of(system: System, timeline: Timeline) -> SystemResponses:
         for task_name, task in computer.tasks.items():
             place = f"{name}.{task_name}"
             jobs = timeline.jobs[place]
-            demand = mean(task.execution) * _rate(task, computer.clock_ratio, jobs)
+            demand = demand_of(task, computer, len(jobs) / seconds(timeline.stop))
             tasks[place] = _of_jobs(jobs, demand, bounds[place], task.read == "release")
     for name, network in system.networks.items():
         for message_name, message in network.messages.items():
             place = f"{name}.{message_name}"
             frames = timeline.frames[place]
-            demand = seconds(frame_nanoseconds(network, message)) * _rate(message, 1.0, frames)
+            rate = rate_of(message, 1.0, len(frames) / seconds(timeline.stop))
+            demand = seconds(frame_nanoseconds(network, message)) * rate
             messages[place] = _of_records(frames, demand, bounds[place])
     shared = {**timeline.processors, **timeline.links}
     busy = {name: float((each.end - each.begin).sum()) / timeline.stop for name, each in shared.items()}
@@ -130,13 +130,6 @@ def _of_records(
         aborted=aborted,
         unfinished=len(of) - int(of.done.sum()) - skipped - aborted,
     )
-
-
-def _rate(of: Task | Message, clock_ratio: float, timeline: Jobs | Frames) -> float:
-    """The rate [1/s]: as declared, else as observed."""
-    if of.period is not None:
-        return clock_ratio / of.period
-    return of.arrivals.poisson if of.arrivals is not None else len(timeline) / seconds(timeline.stop)
 
 
 def _deadline(of: Jobs | Frames) -> float | None:

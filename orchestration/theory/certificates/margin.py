@@ -39,7 +39,7 @@ from orchestration.theory.certificates.repeated import NOT_SEARCHED, least_repea
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jitter
 from orchestration.theory.stability.in_double import are_in_double, of_code
-from orchestration.theory.stability.known_loops import rested, warn_of_periods
+from orchestration.theory.stability.known_loops import rested, warned_of_timing
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.scheduled import without_scheduler
 
@@ -171,8 +171,8 @@ def highest_at(system: System, path: str) -> float:
 def linear_loop_of(request: Request) -> CertifiedLoop:
     """The loop of a request about its operating point, from its FMUs, without computers and networks."""
     files = files_of(system := system_of(request))
-    warn_of_periods(system, files)
-    return isolated_call(files.fmus.values(), _linear_loop_of, request)
+    with warned_of_timing(system, files):
+        return isolated_call(files.fmus.values(), _linear_loop_of, request)
 
 
 def _linear_loop_of(request: Request) -> CertifiedLoop:

@@ -92,7 +92,7 @@ def least_repeated(system: System, cause: Cause, models: Mapping[str, Model], pe
     if len(unknown) == len(words):
         searched += f"; at {quantity(value, 's')} {unknown[words[0]]}"
     elif unknown:
-        searched += f"; without {len(unknown)} of {len(words)} whose schedule does not repeat"
+        searched += f"; without {len(unknown)} of {len(words)}: {next(iter(unknown.values()))}"
     if worst is None:
         return RepeatedSearch(searched=searched, last=good)
     least = bisected(lambda x: fails(x, worst), good, value, FINE * cause.period).bad

@@ -17,7 +17,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.exact.flown import doubt
 from orchestration.theory.exact.loops import Converged, Loops
 from orchestration.theory.exact.objectives import ObjectiveMeans
-from orchestration.theory.stability.known_loops import LOOPS, rested, warn_of_periods
+from orchestration.theory.stability.known_loops import LOOPS, rested, warned_of_timing
 
 
 @passable
@@ -82,9 +82,9 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
     with errors_in_own_terms(request):
         system = rested(request)
         files = files_of(system)
-        warn_of_periods(system, files)
         loops = Loops(files.models, simulated=as_simulated)
-        return isolated_call(files.fmus.values(), expected_of, system, loops, horizon, True)
+        with warned_of_timing(system, files):
+            return isolated_call(files.fmus.values(), expected_of, system, loops, horizon, True)
 
 
 def expected_of(system: System, loops: Loops, horizon: float | None = None, flown: bool = False) -> Expected:

@@ -16,6 +16,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.systems.expressions.syntax import Call
+from orchestration.systems.schedule.overload import errors_name_overload
 from orchestration.systems.schedule.plan import Plan
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
 from orchestration.systems.system.connection import component_of
@@ -269,7 +270,8 @@ class Loops:
         tasks, links = sampled_tasks(system, schedule), links_of(system, schedule)
         turns = {name: len(part.turns) for name, part in linear.parts.items() if isinstance(part, SampledSystem)}
         tasks, links = by_turns(tasks, links, turns)
-        expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
+        with errors_name_overload(system):
+            expect_same_steps(system, tasks, linear.parts, repeating=horizon is None)
         if self.simulated:
             expect_rows(system, tasks, links)
         return tasks, links

@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, ends_of_good
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, prefixed
 from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.files import Files
@@ -38,9 +37,13 @@ def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) 
 
 
 def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> LinearLimit:
-    @cache
+    tried = dict[float, float]()
+
     def above(value: float) -> float:
-        return loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) - 1.0
+        if value not in tried:
+            with prefixed(f"at {span.text(value)}: "):
+                tried[value] = loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) - 1.0
+        return tried[value]
 
     values = span.values()
     width = LIMIT_TOLERANCE * span.tolerance
@@ -51,7 +54,10 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
         return LinearLimit(reason=f"second moments grow without bound at {span.text(values[0])}, where the scan begins")
     good, bad = ((value, above(value)) for value in (bracket.good, bracket.bad))
     low, high = zero_between(above, lambda value: value, good, bad, ROOT)
-    return LinearLimit(limit=0.5 * (low + high))
+    return LinearLimit(
+        limit=0.5 * (low + high),
+        reason=f"nor at what was tried above, up to {span.text(max(tried))}; other values above may have one again",
+    )
 
 
 SURE_TOLERANCE = 1e-3

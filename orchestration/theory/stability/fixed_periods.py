@@ -11,6 +11,7 @@ from fractions import Fraction
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.foundation.basics.unit_algebra import quantity
+from orchestration.systems.schedule.overload import errors_name_overload
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import lowest
@@ -39,7 +40,9 @@ def in_fixed_periods(system: System) -> System:
     if not system.uses_scheduler:
         return calm
     expect_certain(at_operating_point(system))
-    return _Fixed(calm, periodic_schedule(calm)).system()
+    schedule = periodic_schedule(calm)
+    with errors_name_overload(calm):
+        return _Fixed(calm, schedule).system()
 
 
 class _Fixed:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from orchestration.foundation.basics.registry import Registry
 from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.processes.passable import passable
+from orchestration.systems.schedule.overload import overloads_in_words
 
 if TYPE_CHECKING:
     from orchestration.foundation.basics.bisection import Range
@@ -64,9 +66,16 @@ def rested(request: Request, *, checked: bool = True) -> System:
     return request.as_system()
 
 
-def warn_of_periods(system: System, files: Files, other: System | None = None) -> None:
-    """Warn of components whose code believes another period than theirs, as a run does; `other` as there."""
+@contextmanager
+def warned_of_timing(system: System, files: Files, other: System | None = None) -> Iterator[None]:
+    """Warn, as a run does, of components whose code believes another period than theirs; `other` as there.
+
+    Of overloaded processors where the block finds an answer: where it does not, its error names them.
+    """
     from orchestration.simulation.engines.resolved import periods_in_words  # not before: loads the engines
 
     for text in periods_in_words(system, files.models_of(system), other):
+        warn(text)
+    yield
+    for text in overloads_in_words([system] if other is None else [system, other]):
         warn(text)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -23,7 +23,7 @@ from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.in_double import of_code
-from orchestration.theory.stability.known_loops import rested, warn_of_periods
+from orchestration.theory.stability.known_loops import rested, warned_of_timing
 from orchestration.theory.stability.lifted_component import lifted_names
 from orchestration.theory.stability.linear_simulator import OpenPort
 from orchestration.theory.stability.loop_at_rest import AtRest, expect_whole_instances, whole_at_rest
@@ -114,9 +114,9 @@ def in_isolation(
     with errors_in_own_terms(loaded):
         files = files_of(system := system_of(loaded))
         if is_loop:
-            warn_of_periods(system, files)
             inform_of_chance(system)
-    return isolated_call(files.fmus.values(), find, loaded, asked)
+        with warned_of_timing(system, files) if is_loop else nullcontext():
+            return isolated_call(files.fmus.values(), find, loaded, asked)
 
 
 def _linearised(request: Request, component: str | None) -> Linearised:

@@ -12,6 +12,7 @@ from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
 from orchestration.foundation.basics.unit_algebra import some
 from orchestration.simulation.requests.ranges import Varied
+from orchestration.systems.schedule.overload import overloads
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.excitation import ImpreciseError
 from orchestration.theory.stability.in_double import are_in_double, of_code
@@ -137,14 +138,19 @@ def _by_twins(at: Callable[[float], System], span: Range) -> LinearLimit:
             if decays and _rate(at, instances, known, OTHER_SIZE, decays[0]) > 0.0:
                 decays.clear()
             return LinearLimit(
-                reason=f"no local limit: {_tried_before(decays, span)}at {span.text(unknown)} the schedule of "
-                "computers and networks is not known to repeat, so that no law of one period says whether small "
-                "deviations grow: expected values at which it repeats soon, as expect tells"
+                reason=f"no local limit: {_tried_before(decays, span)}at {span.text(unknown)} {_load(at(unknown))}the "
+                "schedule of computers and networks is not known to repeat, so that no law of one period says whether "
+                "small deviations grow: expected values at which it repeats soon, as expect tells"
             )
     return LinearLimit(
         reason="no local limit: whether small deviations grow depends on how small they are, as of code in single "
         "precision, or that switches"
     )
+
+
+def _load(system: System) -> str:
+    """Its overloaded processors, in words before what follows from them; empty without one."""
+    return "".join(f"{one.text()}; " for one in overloads(system))
 
 
 def _as_accurate(end: float | None, found: LinearLimit) -> float | None:

@@ -19,6 +19,7 @@ from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds
 from orchestration.systems.computers import note, parts
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import LATER, NONE
+from orchestration.systems.schedule.overload import errors_name_overload
 from orchestration.systems.schedule.resources import Resources
 from orchestration.systems.schedule.streams import Streams
 from orchestration.systems.system.component import Sampling, has_scheduled_instants
@@ -156,7 +157,8 @@ def periodic_schedule(
         if found is not None:
             return found
         if count >= MOST_WINDOWS or 4 * trace.jobs > MAX_SIMULATED_JOBS:
-            raise UsageError(windows.failure_text())
+            with errors_name_overload(system):
+                raise UsageError(windows.failure_text())
         count *= 2
 
 

@@ -30,7 +30,7 @@ from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart_of
 from orchestration.theory.stability.fixed_periods import in_fixed_periods
 from orchestration.theory.stability.in_double import are_in_double, of_code
-from orchestration.theory.stability.known_loops import rested, warn_of_periods
+from orchestration.theory.stability.known_loops import rested, warned_of_timing
 from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, keep_start, whole_at_rest
 from orchestration.theory.stability.operating_point import (
     NotAnEquilibriumError,
@@ -209,9 +209,9 @@ def locus(
     span = search_range(
         varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
     )
-    warn_of_periods(varied.at(span.last), files, varied.at(span.values()[0]))
     inform_of_chance(varied.system)
-    return isolated_call(files.fmus.values(), _root_locus, varied, span, count)
+    with warned_of_timing(varied.at(span.last), files, varied.at(span.values()[0])):
+        return isolated_call(files.fmus.values(), _root_locus, varied, span, count)
 
 
 def _spaced(span: Range, count: int, spaced: Callable[[float, float, int], Floats]) -> list[float]:

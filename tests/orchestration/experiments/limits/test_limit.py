@@ -569,17 +569,17 @@ def test_only_the_quantity_varies(stubbed: type[StubPool]) -> None:
 def test_a_gap_of_more_than_a_tenth_of_the_local_limit_is_noted() -> None:
     found = limits.limit(scenario_of(), "period")
     assert found.local_limit == pytest.approx(0.080, abs=0.0005)
-    assert "more than a tenth below the local limit" in found.note
-    assert "by large signals or as small ones decay too slowly for the horizon" in found.note
+    assert "more than a tenth below the local limit" in "\n".join(found.notes)
+    assert "by large signals or as small ones decay too slowly for the horizon" in "\n".join(found.notes)
 
 
 def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
-    assert "within a tenth of the local limit" in limits.limit(scenario_of(), "period").note
+    assert "within a tenth of the local limit" in "\n".join(limits.limit(scenario_of(), "period").notes)
     monkeypatch.setattr(limits, "local_limits", lambda varied, span: LinearLimit(limit=0.07, accuracy=0.01))
-    note = limits.limit(scenario_of(), "period").note
+    note = limits.limit(scenario_of(), "period").notes[-1]
     assert note.endswith("not told apart from the local limit, which is 70 ms ± 10 ms")
 
 
@@ -588,7 +588,7 @@ def test_a_limit_as_coarse_as_its_tolerance_is_not_said_to_be_below_the_local_on
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(limits, "local_limits", lambda varied, span: LinearLimit(limit=0.06))
-    note = limits.limit(scenario_of(), "period", first=0.02, scan=0.06, tolerance=0.06).note
+    note = limits.limit(scenario_of(), "period", first=0.02, scan=0.06, tolerance=0.06).notes[-1]
     assert note.endswith("within a tenth of the local limit of 60 ms, to the tolerance")
 
 
@@ -599,9 +599,14 @@ def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
     span = Range(first=0.001, step=0.0015, last=0.004, tolerance=1e-5)
     assert limits._missed_from(varied, span, [0.001, 0.002]) is None  # 100 % busy, and in time
     assert limits._missed_from(varied, span, [0.001, 0.0025, 0.003]) == pytest.approx(0.002 + 0.5e-5, abs=0.5e-5)
-    late = limits._overloaded(0.002, LinearLimit(limit=0.003), span)
+    late = limits._where_missed(0.002, LinearLimit(limit=0.003), span)
     assert late[0].startswith("where deadlines are missed, from 2 ms on, stability need not be an interval")
-    assert limits._overloaded(0.004, LinearLimit(limit=0.003), span) == []
+    assert limits._where_missed(0.004, LinearLimit(limit=0.003), span) == []
+    assert limits._overloaded(varied, span, [0.001, 0.002]) == []
+    (note,) = limits._overloaded(varied, span, [0.001, 0.0025, 0.003])
+    assert note.startswith(
+        "at 2.5 ms to 3 ms: computers.cpu: overloaded, its tasks demand up to 125 % of its time: jobs of load wait"
+    )
     varied = Varied(request=system, of="computers.cpu.tasks.fast.execution")
     assert limits._starved(varied, span, [0.001, 0.0025]) == []  # late, and done
     assert limits._starved(varied, span, [0.0025, 0.004, 0.005]) == [
@@ -619,7 +624,7 @@ def test_linear_theory_tries_the_values_at_which_runs_fail(
     assert 0.0317 < (limits.limit(scenario_of(), "period", first=0.03, scan=0.005).local_limit or 0.0) < 0.035
     monkeypatch.setattr(limits, "local_limits", lambda varied, span: LinearLimit(limit=0.031))
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.0334 else 1.0)
-    note = limits.limit(scenario_of(), "period", first=0.03, scan=0.005).note
+    note = limits.limit(scenario_of(), "period", first=0.03, scan=0.005).notes[-1]
     assert note.endswith("31 ms, from which on small motions grow: a run of 30 s does not show slow growth")
 
 
@@ -630,7 +635,7 @@ def test_a_range_without_failures_or_without_good_values_is_noted(
     nothing_fails = limits.limit(scenario_of(), "jitter")
     assert nothing_fails.large_signal_limit is None
     assert "good throughout the scan" in nothing_fails.verdict
-    assert "ultimate_bound is 10 mm at each value tried, as where nothing moves" in nothing_fails.note
+    assert "ultimate_bound is 10 mm at each value tried, as where nothing moves" in "\n".join(nothing_fails.notes)
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 1.0)
     nothing_good = limits.limit(scenario_of(), "delay")
     assert nothing_good.large_signal_limit is None
@@ -662,7 +667,7 @@ def test_one_seed_that_is_not_good_is_enough_to_fail(stubbed: type[StubPool], mo
     found = limits.limit(scenario_of(), "loss")
     assert found.large_signal_limit == pytest.approx(0.222, abs=0.01)
     assert found.local_limit is None
-    assert "linear theory has no local limit of loss" in found.note
+    assert "linear theory has no local limit of loss" in "\n".join(found.notes)
 
 
 def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -675,7 +680,7 @@ def test_good_values_above_the_limit_are_reported(stubbed: type[StubPool], monke
     assert found.flies_above == (0.045, 0.05, 0.055)
     assert [one.value for one in found.tried if one.value >= 0.035] == [0.035, 0.04, 0.045, 0.05, 0.055]
     assert found.scan == 0.005
-    assert "narrower than the scan, 5 ms, is not seen" in found.note
+    assert "narrower than the scan, 5 ms, is not seen" in "\n".join(found.notes)
     coarse = limits.limit(scenario_of(), "period", scan=0.05)
     assert (coarse.scan, coarse.large_signal_limit) == (0.05, None), "as its help says, it sees no gap that small"
 
@@ -693,15 +698,18 @@ def test_values_that_are_good_in_a_band_around_the_own_one_have_both_ends(
     )
     assert (found.large_signal_limit, found.large_signal_lower_limit) == (0.0315, 0.00625)
     assert (
-        "scanned from 5 ms to 55 ms, as a search ends soon after what fails: beyond that nothing is known" in found.note
+        "scanned from 5 ms to 55 ms, as a search ends soon after what fails: beyond that nothing is known"
+        in found.notes
     )
     from_below = limits.limit(scenario_of(), "period", first=0.005)
     assert (from_below.large_signal_limit, from_below.large_signal_lower_limit) == (0.0315, 0.00625)
     without_own = limits.limit(scenario_of(), "period", first=0.035)
     assert without_own.verdict.startswith("period not good even at 35 ms, where the scan begins: diverged")
-    assert "with --from 0.01 --to 0.5 the search would go up and down from the file's own value" in without_own.note
+    assert "with --from 0.01 --to 0.5 the search would go up and down from the file's own value" in "\n".join(
+        without_own.notes
+    )
     bad_own = limits.limit(scenario_of(period=0.04), "period")
-    assert "the file's own value, 40 ms, is not good either" in bad_own.note
+    assert "the file's own value, 40 ms, is not good either" in "\n".join(bad_own.notes)
 
 
 @pytest.mark.parametrize(
@@ -730,7 +738,7 @@ def test_the_value_at_which_nine_in_ten_is_refuted_is_noted_with_its_interval(
     by_value = {one.value: one for one in found.tried}[found.refuted_limit or 0.0]
     assert (by_value.flew, by_value.runs) == (22, 29)
     assert by_value.share == wilson(22, 29)
-    assert "22 of 29 seeds are good, a share of 0.58 to 0.88" in found.note
+    assert "22 of 29 seeds are good, a share of 0.58 to 0.88" in "\n".join(found.notes)
     heads, *rows = shares_as_text(found)
     assert heads == ["loss", "good of 29", "share [95 % Wilson interval]"]
     assert ["0.25", "29", "1.00 [0.88, 1.00]"] in rows
@@ -831,8 +839,8 @@ def test_a_mass_mismatch_has_no_local_limit_with_the_reason_noted() -> None:
     found = limits.limit(scenario_of().with_changes(parameters={"controller.mass": 1.1}), "period")
     assert found.local_limit is None
     assert found.large_signal_limit is not None
-    assert "hover is no equilibrium" in found.note
-    assert len(found.note.splitlines()) == 1
+    assert "hover is no equilibrium" in "\n".join(found.notes)
+    assert all(len(note.splitlines()) == 1 for note in found.notes)
 
 
 def test_find_runs_the_scenario_and_its_result_is_json() -> None:
@@ -844,7 +852,7 @@ def test_find_runs_the_scenario_and_its_result_is_json() -> None:
         "of", "unit", "judged", "judged_unit", "judged_bound", "local_limit", "local_method", "local_accuracy",
         "local_limit_outside", "local_lower_limit", "mean_square_limit", "large_signal_limit",
         "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from", "missed_by", "follows", "horizon",
-        "tolerance", "scan", "geometric", "confidence", "seeds", "flies_above", "continuous", "tried", "note",
+        "tolerance", "scan", "geometric", "confidence", "seeds", "flies_above", "continuous", "tried", "notes",
     }  # fmt: skip
     limit = found.large_signal_limit
     assert limit is not None

@@ -260,7 +260,7 @@ def test_without_an_operating_point_there_is_no_local_limit_with_the_reason_note
     nowhere = dataclasses.replace(system, operating_point={}, stop_time=5.0)
     found = limit(nowhere, K_D, first=1.0, last=2.0, scan=1.0)
     assert (found.local_limit, found.local_method) == (None, None)
-    assert "the system file names no operating_point" in found.note
+    assert "the system file names no operating_point" in "\n".join(found.notes)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.exact.expect import expect
 from orchestration.theory.exact.loops import expect_same_steps
 from orchestration.theory.exact.timing import sampled_tasks
+from orchestration.theory.stability import known_loops
 from orchestration.theory.stability.matrices import Components, SampledSystem
 from orchestration.theory.stability.periodic_schedule import periodic_schedule
 from quadcosim import run
@@ -156,13 +157,19 @@ def test_a_stationary_mean_is_what_means_over_long_horizons_come_to() -> None:
 # -- three servos ------------------------------------------------------------------------------------------------
 
 
-def test_by_rates_the_slowest_of_three_servos_grows_as_its_radius_says() -> None:
-    """Its jobs pile up, and make nobody late: no task has less to say."""
-    servos = example("three_servos")
+def test_by_rates_the_slowest_of_three_servos_grows_as_its_radius_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its jobs pile up, and make nobody late: no task has less to say. The overload is said here and of a run."""
+    servos, said = example("three_servos"), list[str]()
+    monkeypatch.setattr(known_loops, "warn", said.append)
     found = expect(servos)
     assert found.period == pytest.approx(0.06)
     assert found.mean_square_radius > 1.0
-    angle = run(replace(servos, stop_time=6.0)).signals["slow_servo.angle"]
+    flown = run(replace(servos, stop_time=6.0))
+    overload = (
+        "computers.node: overloaded, its tasks demand 123.333 % of its time: jobs of slow wait, ever more of them"
+    )
+    assert said == [*flown.warnings] == [f"{overload}; what is computed is of the jobs that start"]
+    angle = flown.signals["slow_servo.angle"]
     first, last = (np.abs(part).max() for part in (angle[: len(angle) // 3], angle))
     assert math.log(last / first) / (4.0 / found.period) == pytest.approx(
         0.5 * math.log(found.mean_square_radius), rel=0.01
@@ -189,9 +196,10 @@ def test_with_less_to_do_all_three_die_out_as_they_do_in_a_run() -> None:
 
 def test_by_deadlines_all_three_fall_behind_and_none_repeats_itself() -> None:
     servos = example("three_servos", {"computers.node.scheduling": "earliest-deadline-first"})
-    with pytest.raises(
-        UsageError, match=r"^computers\.node\.tasks\.slow: falls behind by \d+ jobs in .* expected less load"
-    ):
+    named = (
+        r"^computers\.node: overloaded, its tasks demand 123\.333 % of its time: jobs of slow and middle and fast wait"
+    )
+    with pytest.raises(UsageError, match=rf"{named}, .* computers\.node\.tasks\.slow: falls behind by \d+ jobs in "):
         expect(servos)
 
 

@@ -44,8 +44,9 @@ def test_over_a_network_it_grows_as_the_exact_expectation_by_the_timetable_says(
         ({"period": 0.012, "offset": 0.001}, {"offset": 0.0}, "arrive between .* and .* ms after it has read"),
         ({}, {"execution": Distribution(uniform=(0.001, 0.002))}, r"control\.execution: random from job to job"),
         ({"period": None, "arrivals": Arrivals(poisson=20.0)}, {}, r"filter\.arrivals: random"),
+        ({"execution": 0.0018}, {}, r"^computers\.node: overloaded, .* of control wait, .* of \d+ jobs in .* start"),
     ],
-    ids=["phase", "latency", "execution", "arrivals"],
+    ids=["phase", "latency", "execution", "arrivals", "overload"],
 )  # fmt: skip
 def test_a_phase_or_a_latency_that_varies_is_refused_naming_it(
     load: dict[str, Any], job: dict[str, Any], named: str
