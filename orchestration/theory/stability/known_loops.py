@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from orchestration.foundation.basics.registry import Registry
 from orchestration.foundation.basics.terminal import warn
 from orchestration.foundation.processes.passable import passable
-from orchestration.systems.schedule.overload import overloads_in_words
 
 if TYPE_CHECKING:
     from orchestration.foundation.basics.bisection import Range
@@ -73,6 +72,7 @@ def warned_of_timing(system: System, files: Files, other: System | None = None) 
     Of overloaded processors where the block finds an answer: where it does not, its error names them.
     """
     from orchestration.simulation.engines.resolved import periods_in_words  # not before: loads the engines
+    from orchestration.systems.schedule.overload import overloads_in_words
 
     for text in periods_in_words(system, files.models_of(system), other):
         warn(text)

@@ -17,7 +17,7 @@ BAD = replace(GOOD, value=0.0355, outcome="diverged", divergence_time=3.0, flew=
 LIMIT = Limit(
     of="period", unit="s", local_limit=None, local_limit_outside=None, large_signal_limit=GOOD.value,
     refuted_limit=None, horizon=30.0, tolerance=0.0005, scan=0.005, confidence=None, seeds=1, flies_above=(),
-    continuous=None, tried=(GOOD, BAD), note="",
+    continuous=None, tried=(GOOD, BAD), notes=(),
 )  # fmt: skip
 RESOLUTION = "(scan 5 ms, tolerance 0.5 ms)"
 

@@ -336,7 +336,7 @@ def limit(of: str, **others: Any) -> Limit:
     known = Limit(
         of=of, unit="s", judged="ultimate_bound", judged_unit="m", local_limit=0.08, local_limit_outside=0.08,
         large_signal_limit=0.05, refuted_limit=None, horizon=30.0, tolerance=0.001, scan=0.005, confidence=None,
-        seeds=1, flies_above=(), continuous=None, tried=tried, note="",
+        seeds=1, flies_above=(), continuous=None, tried=tried, notes=(),
     )  # fmt: skip
     return dataclasses.replace(known, **others)
 
