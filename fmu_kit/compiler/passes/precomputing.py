@@ -29,7 +29,7 @@ def precompute(program: Program) -> Program:
     call = next(each for each in reversed(rest) if each.op == "call")
     version = program.versions[call.data.memory, call]
     computed = tuple(
-        statement("store", (_as_read(value, version),), place.name) for place, value in whole.places.values()
+        statement("store", (whole.as_read(value, version),), place.name) for place, value in whole.places.values()
     )
     stores = taking.stores | {place.name for place, _ in whole.places.values()}
     whole.made[taking] = replace(taking, body=(*rest, *computed, last), stores=stores)
@@ -93,6 +93,8 @@ class _Precomputing:
         self.versions: dict[tuple[int, Statement], int] = {}
         self.made: dict[Function, Function] = {}
         self._kinds: dict[int, tuple[bool, bool]] = {}
+        self._read: dict[int, dict[int, Symbol]] = {}
+        """What `as_read` has made, by version and identity"""
 
     def function(self, f: Function) -> Function:
         """`f`, with the functions that it calls, reading precomputed values."""
@@ -109,6 +111,15 @@ class _Precomputing:
         if value not in self.places:
             self.places[value] = (Place(f"self.computed.{len(self.places) + 1}", value.kind, None), value)
         return self.places[value][0]
+
+    def as_read(self, value: Symbol, version: int) -> Symbol:
+        """A value that depends on parameters alone, computed from this version of the memory."""
+        known = self._read.setdefault(version, {})
+        for one in unknown_below(value, lambda each: id(each) in known):
+            args = [known[id(arg)] for arg in one.args]
+            data = (one.data[0], version) if one.op == "load" else one.data
+            known[id(one)] = node(one.op, args, one.kind, data)
+        return known[id(value)]
 
     def is_precomputable(self, symbol: Symbol) -> bool:
         """Whether a value depends on parameters alone, and needs more than a few sums and products."""
@@ -175,13 +186,5 @@ class _Body:
         if not symbol.args:
             return symbol
         if self._after_taking and self.whole.is_precomputable(symbol):
-            return node("load", (), symbol.kind, (self.whole.place_of(_as_read(symbol, 0)).name, 0))
+            return node("load", (), symbol.kind, (self.whole.place_of(self.whole.as_read(symbol, 0)).name, 0))
         return None
-
-
-def _as_read(symbol: Symbol, version: int) -> Symbol:
-    """A value that depends on parameters alone, computed from this version of the memory."""
-    if symbol.op == "load":
-        return node("load", (), symbol.kind, (symbol.data[0], version))
-    args = [_as_read(arg, version) for arg in symbol.args]
-    return node(symbol.op, args, symbol.kind, symbol.data) if args else symbol

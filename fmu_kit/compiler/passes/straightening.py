@@ -304,9 +304,19 @@ def _raises(block: Block) -> bool:
 
 
 def _alternatives(condition: Symbol) -> list[Symbol]:
-    """Conditions of which any holds where the given one does."""
-    if condition.op == "or":
-        return [part for each in condition.args for part in _alternatives(each)]
-    if condition.op == "not" and condition.args[0].op == "and":
-        return [part for each in condition.args[0].args for part in _alternatives(truth(negation(each)))]
-    return [condition]
+    """Conditions of which any holds where the given one does, each once."""
+    found: dict[Symbol, None] = {}
+    seen: set[Symbol] = set()
+    waiting = [condition]
+    while waiting:
+        one = waiting.pop()
+        if one in seen:
+            continue
+        seen.add(one)
+        if one.op == "or":
+            waiting += reversed(one.args)
+        elif one.op == "not" and one.args[0].op == "and":
+            waiting += (truth(negation(each)) for each in reversed(one.args[0].args))
+        else:
+            found[one] = None
+    return list(found)
