@@ -465,9 +465,9 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
     master.initialise()
     exchanged, after = [master.board.place[signal] for signal in exchanged_signals(system)], time_to_rest(system)
 
-    def rows_from(begin: Fraction) -> Floats:
+    def rows_from(begin: Fraction, count: int = SETTLED) -> Floats:
         rows = []
-        for k in range(SETTLED):
+        for k in range(count):
             if master.run(pause_at=round(begin + k * period)):
                 why = master.divergence or master.running.termination or "it was interrupted"
                 rest = f" in {after:g} s, or without {AFTER} such at which it rests" if after else ""
@@ -479,7 +479,11 @@ def _settle(simulation: PreparedRun, begin: Fraction, period: Fraction) -> None:
         return np.array(rows)
 
     half = begin_of(system, period) + math.ceil(exact_nanoseconds(after) / 2 / period) * period
-    before = rows_from(half) if half + SETTLED * period <= begin else master.board.row[exchanged][None].copy()
+    if half + SETTLED * period <= begin:
+        before = rows_from(half)
+    else:
+        initial, first = master.board.row[exchanged].copy(), latest_offset(system)
+        before = np.vstack([initial, *rows_from(first, int((begin - first) / period))])
     calm = rows_from(begin)
     start, end = (float(begin + k * period) / NANOSECONDS for k in (-1, SETTLED - 1))
     try:

@@ -145,25 +145,23 @@ def expect_rest(
     if moved[worst] <= AT_REST:
         return
     signal, after = exchanged_signals(system)[worst], time_to_rest(system)
-    first, by, by_half = (
-        quantity(value, unit(signal), digits)
-        for value, digits in ((before[0, worst], 4), (_change(calm)[worst], 2), (_change(before)[worst], 2))
-    )
-    text = f"{signal} moves by {by}"
+    rows, of = np.concatenate([before, calm])[:, worst], unit(signal)
     if not after:
+        first, farthest = (quantity(value, of, 4) for value in (rows[0], rows[np.abs(rows - rows[0]).argmax()]))
         none = "" if system.operating_point else ", of which there are none"
         raise NotAnEquilibriumError(
-            f"the operating point is not at rest: {text}, from {first} at the start: expected "
+            f"the operating point is not at rest: {signal} goes from {first} at the start to {farthest}: expected "
             f"values in [operating_point] at which the system rests{none}, or {AFTER} = SECONDS there, which it runs "
             "to rest first; a state without a parameter may also begin at rest by its own code"
         )
-    text = f"the operating point is not at rest after {after:g} s: {text} in {len(calm) - 1} periods"
+    by, by_before = (quantity(_change(rows)[worst], of, 2) for rows in (calm, before))
+    text = f"the operating point is not at rest after {after:g} s: {signal} moves by {by} in {len(calm) - 1} periods"
     if moved[worst] < 0.5 * _moved(before)[worst]:
         raise NotAnEquilibriumError(
-            f"{text}, and by {by_half} after half of that: expected a longer {AFTER} in [operating_point]"
+            f"{text}, and by {by_before} earlier: expected a longer {AFTER} in [operating_point]"
         )
     raise NotAnEquilibriumError(
-        f"{text}, no less than after half of that: unstable here, or an oscillation, no rest: expected a loop that "
+        f"{text}, no less than earlier: unstable here, or an oscillation, no rest: expected a loop that "
         f"settles, or without {AFTER} values in [operating_point] at which the system rests"
     )
 

@@ -237,7 +237,7 @@ def test_noise_loss_and_jitter_do_not_change_the_growth(system: System, instance
 
 def test_a_point_that_is_not_at_rest_is_refused_naming_what_moves(system: System, instances: Instances) -> None:
     moving = dataclasses.replace(system, operating_point={"components.plant.parameters.initial.x": 1.0})
-    with pytest.raises(UsageError, match=r"not at rest: \S+ moves by .* values in \[operating_point\]"):
+    with pytest.raises(UsageError, match=r"not at rest: \S+ goes from .* values in \[operating_point\]"):
         growth_of(moving, instances)
 
 
