@@ -11,7 +11,7 @@ from orchestration.systems.system.computers import Message, Task
 from orchestration.systems.system.connection import Connection, Source, variable_of
 from orchestration.systems.system.distribution import Distribution, Varying
 from orchestration.systems.system.model import System
-from orchestration.systems.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks
+from orchestration.systems.system.placement import PlacedMessage, PlacedTask, placed_messages, placed_tasks, tasks_of
 
 MAX_NAMES_IN_CELL = 6
 """names in a cell; more are counted"""
@@ -87,8 +87,14 @@ def describe_clock(system: System) -> str:
     sampled = {name: each for name, each in system.components.items() if each.sampling is not None}
     if not sampled:
         return "nothing is sampled"
-    rates = [f"{name} {describe_rate(each)}" for name, each in sampled.items()]
-    return f"sampled {describe_rate(*sampled.values()) if len(sampled) == 1 else listed(rates, MAX_RATES)}"
+    tasks = tasks_of(system)
+    rates = {name: _by(tasks[name]) if name in tasks else describe_rate(each) for name, each in sampled.items()}
+    several = [f"{name} {rate}" for name, rate in rates.items()]
+    return f"sampled {listed(several, MAX_RATES) if len(several) > 1 else rates.popitem()[1]}"
+
+
+def _by(of: PlacedTask) -> str:
+    return f"by task {of.name} of {of.computer_name} {_released(of.task)}"
 
 
 def _task(of: PlacedTask) -> tuple[str, ...]:
@@ -98,8 +104,7 @@ def _task(of: PlacedTask) -> tuple[str, ...]:
     how += [f"reads at {task.read}"] if task.read != "start" else []
     how += [f"writes at {task.write}"] if task.write != "end" else []
     how += [f"overruns {task.overrun}"] if task.overrun != "queue" else []
-    released = f"on {task.on}" if task.on is not None else _released(task)
-    return f"{of.computer_name}.{of.name}", task.component or "load", released, ", ".join(how)
+    return f"{of.computer_name}.{of.name}", task.component or "load", _released(task), ", ".join(how)
 
 
 def _message(of: PlacedMessage) -> tuple[str, ...]:
@@ -115,6 +120,8 @@ def _message(of: PlacedMessage) -> tuple[str, ...]:
 def _released(of: Task | Message) -> str:
     if of.arrivals is not None:
         return f"{of.arrivals.poisson:g} a second at random"
+    if isinstance(of, Task) and of.on is not None:
+        return f"on {of.on}"
     parts = [f"every {time_text(of.period or 0.0)}"]
     parts += [f"from {time_text(of.offset)}"] if of.offset else []
     parts += [f"jitter {describe_varying(of.jitter)}"] if of.jitter else []

@@ -30,7 +30,7 @@ from orchestration.theory.stability.sign_changes import short, uncertainty, zero
 LOOP = "spectral radius of the sampled loop about the operating point, by differences through saved states"
 LOOP_ZERO, TWINS_TOLERANCE = 1e-6, 0.2
 """Growth that counts as 0, as a share of that beyond the limit; tolerance as a share of that of the measured limit"""
-TWINS = "growth of the difference of twin runs from the operating point, one of them perturbed by a pulse"
+TWINS = "growth of the difference of twin runs from the operating point, one with a pulse"
 OTHER_SIZE = 100.0
 """Factor of the second pulse of twin runs, which has to confirm growth and decay"""
 DITHERED = 1.37
@@ -72,13 +72,13 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
     except (UsageError, SimulatorError) as error:
         why = str(error)
     if commensurate(at, span.values()) is not None:
-        return LinearLimit(reason=f"no local limit: several rates, and saved states do not suffice: {why}")
+        return LinearLimit(reason=f"no local limit: several rates, and no spectral radius: {why}")
     try:
         found = _by_twins(at, span)
     except (UsageError, SimulatorError) as error:
         return LinearLimit(reason=f"no local limit: {error}")
     code = of_code(are_in_double(deterministic(at(span.first)).components))
-    return replace(found, method=f"{TWINS}{code}, as saved states do not suffice: {why}")
+    return replace(found, method=f"{TWINS}{code} (no spectral radius: {why})")
 
 
 def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LinearLimit:

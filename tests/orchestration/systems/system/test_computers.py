@@ -11,6 +11,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.schedule.schedule_cache import schedule_key
 from orchestration.systems.system.component import SamplingOnArrival, TaskSampling
 from orchestration.systems.system.computers import Message, Network
+from orchestration.systems.system.description import describe_clock
 from orchestration.systems.system.file import is_system, load_system
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.frames import frame_nanoseconds
@@ -36,6 +37,16 @@ def test_a_written_system_is_read_as_the_same(file, tmp_path):
     assert isinstance(system.components["controller"].sampling, TaskSampling)
     assert isinstance(system.components["filter"].sampling, SamplingOnArrival)
     assert system.components["controller"].sampling.period == pytest.approx(0.02 * 1.001)
+
+
+@pytest.mark.parametrize(
+    ("released", "when"),
+    [('on = "filtered"', "on filtered"), ("period = 0.02\noffset = 0.004", "every 20 ms, from 4 ms")],
+)
+def test_the_clock_of_a_component_that_is_a_task_says_when_it_is_released(file, released, when):
+    file.write_text(FILE.replace('on = "filtered"', released), encoding="utf-8")
+    expected = f"sampled controller by task control of node {when}, filter on angle"
+    assert describe_clock(load_system(file)) == expected
 
 
 def test_computers_and_networks_alone_are_a_system(tmp_path):

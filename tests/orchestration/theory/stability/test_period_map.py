@@ -209,7 +209,7 @@ def test_where_an_fmu_saves_no_state_twin_runs_are_used_and_it_is_said(
     assert found.limit == pytest.approx(2.0, abs=0.02)
     assert found.accuracy == pytest.approx(0.02)
     assert found.limit == round(found.limit or 0.0, 2)
-    assert found.method == f"{TWINS}, as saved states do not suffice: the FMU of controller {NO_STATE}"
+    assert found.method == f"{TWINS} (no spectral radius: the FMU of controller {NO_STATE})"
 
 
 SPAN = Range(first=0.05, step=0.01, last=0.09, tolerance=0.001)
@@ -235,4 +235,4 @@ def test_the_quadrotor_with_a_controller_that_saves_no_state_goes_by_twin_runs_a
     found = local_limits(Varied(request=scenario, of="period"), SPAN)
     assert found.limit == pytest.approx(0.072, abs=2e-4)
     assert found.method is not None
-    assert found.method.startswith(f"{TWINS}, as saved states do not suffice: the FMU of plant {NO_STATE} (")
+    assert found.method.startswith(f"{TWINS} (no spectral radius: the FMU of plant {NO_STATE}) (")
