@@ -110,7 +110,8 @@ class AlgebraicLoop:
         """Carry out its connections until their values are consistent; raises `SimulatorError` if none are found."""
         start = self._values()
         try:
-            if not initial.exchange(self._group, self._pass_on, iterations=self._iterations).any():
+            runs = self._running.board.row.shape[1:]
+            if not initial.exchange(self._group, self._pass_on, runs, iterations=self._iterations).any():
                 return
         except _Leaves:
             pass

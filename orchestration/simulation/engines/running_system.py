@@ -53,9 +53,9 @@ class _RunningComponent:
 
     def expect_finite(self, t: float) -> None:
         """Raise `Diverged` for an output that is not finite, before it is passed on."""
-        outputs = self.outputs.tolist()
+        outputs = self.outputs.ravel().tolist()
         if not math.isfinite(sum(outputs)):
-            for name, value in zip(self.names, outputs):
+            for name, value in zip(self.names, outputs):  # of many runs the first may be finite
                 if not math.isfinite(value):
                     raise Diverged(f"{name} = {value} at t = {t:g} s, expected a finite value")
 
@@ -96,10 +96,14 @@ class RunningSystem:
         interrupted: Callable[[], bool] = lambda: False,
         condition: Condition = NEVER,
         at_once: Dependencies = lambda component, output: (),
+        runs: tuple[int, ...] = (),
     ) -> None:
-        """`at_once`: the inputs that an output of a component follows before its next step."""
+        """`at_once`: the inputs that an output of a component follows before its next step.
+
+        `runs` is the shape of runs that simulators of arrays, shape (n, *runs), carry out together.
+        """
         self.system, self.simulators, self.stop = system, simulators, timetable.stop
-        self.wires = wires = Wires(system, recorded)
+        self.wires = wires = Wires(system, recorded, runs)
         self.closing = closing_of(wires, at_once)
         self.board = board = wires.board
         self.sources, self.feeds = list(sources), list(feeds)
@@ -164,7 +168,7 @@ class RunningSystem:
         x = self.system.connections[index]
         inputs = [variable_of(end) for end in x.end]
         sampled = self.system.components[x.receiver].sampling is not None
-        received: Floats = np.zeros(len(inputs)) if sampled else self.board.of(x.end)
+        received: Floats = np.zeros((len(inputs), *self.board.row.shape[1:])) if sampled else self.board.of(x.end)
         return Channel(
             x,
             row=self.board.row,

@@ -22,7 +22,8 @@ class Board:
     time, as they are applied), its connected outputs, and what else is recorded of it.
     """
 
-    def __init__(self, system: System, recorded: Mapping[str, Sequence[str]]) -> None:
+    def __init__(self, system: System, recorded: Mapping[str, Sequence[str]], runs: tuple[int, ...] = ()) -> None:
+        """`runs` is the shape of the runs that are carried out together, each with a number in every column."""
         self.outputs: dict[str, tuple[str, ...]] = {}
         """the outputs that are read of each component"""
         self.connected: dict[str, int] = {}
@@ -40,7 +41,7 @@ class Board:
             self.connected[name] = len(connected if system.connections else outputs)
             columns += [*(inputs if component.sampling is None else ()), *(f"{name}.{output}" for output in outputs)]
         self.columns = tuple(columns)
-        self.row: Floats = np.zeros(len(columns))
+        self.row: Floats = np.zeros((len(columns), *runs))
         self.place = {column: i for i, column in enumerate(columns)}
 
     def of(self, columns: Sequence[str]) -> Floats:
@@ -71,9 +72,9 @@ class Into:
 class Wires:
     """The wiring that follows from the structure of a system, and from what is recorded of it."""
 
-    def __init__(self, system: System, recorded: Mapping[str, Sequence[str]]) -> None:
+    def __init__(self, system: System, recorded: Mapping[str, Sequence[str]], runs: tuple[int, ...] = ()) -> None:
         self.system, self.plan = system, Plan(system)
-        self.board = Board(system, recorded)
+        self.board = Board(system, recorded, runs)
         self.names = tuple(system.components)
 
     @cached_property
@@ -167,7 +168,8 @@ class Channel:
         self.applied: list[tuple[int, Floats]] = []
         """the last two values of a first-order hold, with their times [ns]"""
         self._received, self._sent = received.data, None
-        if isinstance(places, slice) and self._plain and not (self._noisy or self._rounds or self._extrapolates):
+        is_as_sent = self._plain and not (self._noisy or self._rounds or self._extrapolates)
+        if isinstance(places, slice) and is_as_sent and row.ndim == 1:
             self._sent = row[places].data  # a view of what is sent, which arrives unchanged
 
     def pass_on(self) -> None:

@@ -107,13 +107,19 @@ class LiftedTangent(LinearSimulator):
         """As `Simulator`: the next sample, whatever the time."""
         by_state, by_input = self.whole.derivatives(self.samples * h)
         self._given[self.sample] = self.input
-        given, count = self._given[: self.sample + 1].ravel(), len(self.outputs)
+        given, count = np.concatenate(self._given[: self.sample + 1]), len(self.outputs)
         rows = slice(self.sample * count, (self.sample + 1) * count)
         self.output[:] = by_state[rows] @ self.state + by_input[rows, : len(given)] @ given
         self.sample += 1
         if self.sample == self.samples:
             after = slice(self.samples * count, None)
             self.state[:], self.sample = by_state[after] @ self.state + by_input[after] @ given, 0
+
+    def abreast(self, runs: int) -> "LiftedTangent":
+        """As that of `LinearSimulator`."""
+        other = super().abreast(runs)
+        other._given = np.zeros((*self._given.shape[:2], runs))
+        return other
 
     def about(self, rest: Rest) -> "LiftedTangent | None":
         """As that of `Tangent`."""

@@ -1,10 +1,14 @@
 """Linear simulators, which a master steps in place of FMUs."""
 
 from collections.abc import Sequence
+from copy import copy
+from typing import TypeVar
 
 import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats, Transfer
+
+S = TypeVar("S", bound="LinearSimulator")
 
 
 class LinearSimulator:
@@ -17,6 +21,15 @@ class LinearSimulator:
         self.output: Floats = np.zeros(len(outputs))
         self.sample = 0
         """The number of the next sample, from a begin of the loop's period, of one whose samples differ"""
+
+    def abreast(self: S, runs: int) -> S:
+        """The same at rest, for some runs together: each number is a row of theirs."""
+        other = copy(self)
+        other.state, other.input, other.output = (
+            np.zeros((len(x), runs)) for x in (self.state, self.input, self.output)
+        )
+        other.sample = 0
+        return other
 
     def reader(self, names: Sequence[str], into: Floats) -> Transfer:
         """As `Simulator`; variables that are no Reals are not read."""
@@ -66,8 +79,14 @@ class OpenPort(LinearSimulator):
         self.received: Floats = np.zeros(samples * len(inputs))
         self._samples = samples
 
+    def abreast(self, runs: int) -> "OpenPort":
+        """As that of `LinearSimulator`."""
+        other = super().abreast(runs)
+        other.sent, other.received = (np.zeros((len(x), runs)) for x in (self.sent, self.received))
+        return other
+
     def step(self, t: float, h: float) -> None:
         """As `Simulator`."""
-        self.received.reshape(self._samples, -1)[self.sample] = self.input
-        self.output[:] = self.sent.reshape(self._samples, -1)[self.sample]
+        self.received.reshape(self._samples, *self.input.shape)[self.sample] = self.input
+        self.output[:] = self.sent.reshape(self._samples, *self.output.shape)[self.sample]
         self.sample = (self.sample + 1) % self._samples

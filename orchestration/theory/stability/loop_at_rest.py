@@ -165,6 +165,16 @@ class AtRest:
         """The components about rest."""
         return {name: self.tangent(name) for name in self.simulation.instances}
 
+    @cached_property
+    def slowest(self) -> Fraction:
+        """The longest time after which a sampled component responds as before [ns].
+
+        What is in continuous time is measured for it: it serves in all hyperperiods of these components with others.
+        """
+        system = self.simulation.system
+        sampled = [name for name, one in system.components.items() if one.sampling is not None]
+        return max([longest_period(system), *_cycles(system, {name: self.samples(name) for name in sampled})])
+
     @property
     def in_double(self) -> tuple[str, ...]:
         """Its components whose float code is in double precision."""
@@ -194,7 +204,7 @@ class AtRest:
         return self.begun[name]
 
     def _kept(self, name: str, found: AnyTangent) -> AnyTangent:
-        self.known[name] = self.simulation.system.components[name], self.period, found
+        self.known[name] = self.simulation.system.components[name], self.slowest, found
         self.begun[name] = found
         return found
 
@@ -202,7 +212,7 @@ class AtRest:
         """The one of `known` if it holds here."""
         component = self.simulation.system.components[name]
         before, period, known = self.known.get(name, (None, Fraction(0), None))
-        is_long = component.sampling is not None or period >= self.period >= FINEST * period
+        is_long = component.sampling is not None or period >= self.slowest >= FINEST * period
         if known is None or before != component or not is_long:
             return None
         self.simulation.instances[name].restore(self.saved_states[name])
@@ -211,9 +221,10 @@ class AtRest:
     def _measured(self, name: str) -> AnyTangent | SampledRest:
         self.simulation.instances[name].restore(self.saved_states[name])
         model, rest = self.simulation.instances[name].model, self.rest_of(name)
-        component, period = self.simulation.system.components[name], float(self.period) / NANOSECONDS
+        component = self.simulation.system.components[name]
         if component.sampling is not None:
             return of_samples(rest, component.sampling.period)
+        period = float(self.slowest) / NANOSECONDS
         step = component.step or period
         unit = None if model.varies_step else step
         return self._kept(name, in_continuous_time(rest, period, step, unit=unit))

@@ -1,8 +1,8 @@
 """The map of a linear loop over a period, under the clock of the system.
 
 The master exchanges values between tangents. The state of the loop is what components, connections and the row of
-signals hold; its map is found by one period from each of these numbers, and, where a component is replaced by an open
-port, from each of the numbers that the port sends.
+signals hold; its map is found by a period from each of these numbers, many together, and, where a component is
+replaced by an open port, from each of the numbers that the port sends.
 """
 
 import math
@@ -30,6 +30,8 @@ from orchestration.theory.stability.loop_at_rest import AtRest, KnownTangents, b
 
 MAX_STATES = 1000
 """states of a loop"""
+ABREAST = 64
+"""Numbers from each of which a period is run together"""
 OTHER_PULSE = 0.25
 """Factor of the second pulse, whose growth is compared"""
 
@@ -43,7 +45,8 @@ def period_map(
     than those of the loop at rest may carry the signals, as later ones.
     """
     ports = ports or {}
-    simulators = {**loop.tangents, **ports}
+    ports = {name: port.abreast(ABREAST) for name, port in ports.items()}
+    simulators = {**{name: one.abreast(ABREAST) for name, one in loop.tangents.items()}, **ports}
     system = loop.simulation.system
     if connections is not None:
         system = replace(system, connections=tuple(connections))
@@ -59,13 +62,14 @@ def period_map(
     if columns > MAX_STATES:
         raise UsageError(f"the loop has {columns} states, more than {MAX_STATES}")
     result: Floats = np.zeros((rows, columns))
-    for i, unit in enumerate(np.eye(columns)):
-        _assign(unit, [*_state_parts(master, simulators), *(port.sent for port in ports.values())])
-        master.run(pause_at=round(begin + (i + 1) * loop.period))
+    for k, first in enumerate(range(0, columns, ABREAST), 1):
+        units = np.eye(columns, ABREAST, -first)
+        _assign(units, [*_state_parts(master, simulators), *(port.sent for port in ports.values())])
+        master.run(pause_at=round(begin + k * loop.period))
         after = np.concatenate([*_state_parts(master, simulators), *received])
         if len(after) != rows:
             raise UsageError("the number of messages in transit changes over a period")
-        result[:, i] = after
+        result[:, first : first + ABREAST] = after[:, : columns - first]
     if not np.isfinite(result).all():
         raise UsageError("the loop has no finite derivative at the operating point")
     return result
@@ -91,7 +95,7 @@ def _master(loop: AtRest, system: System, begin: Fraction, simulators: Mapping[s
     simulation = loop.simulation
     system = replace(
         system,
-        stop_time=float(begin + (MAX_STATES + 2) * loop.period) / NANOSECONDS,
+        stop_time=float(begin + (MAX_STATES // ABREAST + 2) * loop.period) / NANOSECONDS,
         components={
             name: _with_even_steps(component, loop.period)
             if simulation.instances[name].model.varies_step
@@ -104,7 +108,9 @@ def _master(loop: AtRest, system: System, begin: Fraction, simulators: Mapping[s
     )
     streams, models = Streams(system.seed, system.streams), {n: i.model for n, i in simulation.instances.items()}
     timetable, recorded = Timetable(system, streams, fixed_steps(system, models)), dict.fromkeys(simulators, ())
-    running = RunningSystem(system, simulators, timetable=timetable, streams=streams, recorded=recorded)
+    running = RunningSystem(
+        system, simulators, timetable=timetable, streams=streams, recorded=recorded, runs=(ABREAST,)
+    )
     return Master(running, NullRecorder())
 
 
