@@ -141,6 +141,7 @@ def locus(
     document = {
         "of": found.of, "unit": found.unit, "values": found.values.tolist(), "radius": found.radius.tolist(),
         "poles": each, "crossings": crossings, "without": list(found.without),
+        "tried": found.tried, "moved": found.moved,
     }  # fmt: skip
     lines = list(in_columns(rows, right=True)) if found.crossings else []
     return CommandResult(document=document, verdict=found.verdict, lines=lines)

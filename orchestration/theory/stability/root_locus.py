@@ -130,6 +130,10 @@ class RootLocus:
     """The components whose float code in C is taken in double precision."""
     without: tuple[str, ...] = ()
     """The values asked for that have no poles, in rising order, and why each: where the loop has no rest, say."""
+    moved: int = 0
+    """How many values asked for are replaced by others, at which several rates repeat together."""
+    asked: int | None = None
+    """How many values of a period beside others were asked for; None: of another quantity, of which all are tried."""
 
     def __repr__(self) -> str:
         return f"<RootLocus: {self.verdict}>"
@@ -146,6 +150,9 @@ class RootLocus:
         if self.without:
             count = len(self.values) + len(self.without)
             known += f"; no poles at {len(self.without)} of {count} values, as {self.without[0]}"
+        if self.asked is not None:
+            known += f"; {self.tried} values tried, at which all rates repeat together within twenty of the longest"
+            known += f": {self.moved} of {self.asked} are moved to {len(self.values)}" if self.moved else ""
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
@@ -153,6 +160,11 @@ class RootLocus:
             return f"{self.of}: poles {begins} the unit circle at each of {many}, {radii} {known}"
         ways = [f"{'leave' if one.leaves else 'return'} {self.place_of(one)}" for one in self.crossings]
         return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} {known}"
+
+    @property
+    def tried(self) -> int:
+        """How many values were tried, those included between which poles cross."""
+        return len(self.curve[0])
 
     def place_of(self, crossing: Crossing) -> str:
         """Where poles cross, in words: at a value, with the frequency, or between two where rates repeat together."""
@@ -193,11 +205,11 @@ def locus(
     Quantities are those of `limit`: `of` is a path, or for the quadrotor `period` or `delay`; default: the period of
     the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
     times that of the file, delays up to ten periods or twice that of the file. Values are `count`, default 40, evenly
-    spaced, over more than a decade by equal factors, and the file's own. Of a period beside others they are those at
-    which all rates meet, of these or by default of the scan of `limit`, and multiples of the others; crossings are
-    between two such. Holds and delays are included; jitter, loss, noise and quantisation are left out. A pair of
-    crossings between two neighbouring values is not seen, but for jumps of a delay to a sampled component: both sides
-    of each are tried.
+    spaced, over more than a decade by equal factors, and the file's own. A period beside others has poles where all
+    rates repeat together within twenty of the longest: another value is moved to that of the simplest ratio within half
+    of the way to the next, else to the nearest, and crossings are between two such. Holds and delays are included;
+    jitter, loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen,
+    but for jumps of a delay to a sampled component: both sides of each are tried.
 
     Raises `UsageError` for an invalid quantity or range, and as `linearise` where no value has poles.
     """
@@ -230,6 +242,8 @@ class _Tried:
         """Poles by value, and the period [s] that they are over"""
         self.without: dict[float, UsageError] = {}
         """Why values have none"""
+        self.progress: Callable[[], None] = lambda: None
+        """Called after each value"""
         with suppress(UsageError):  # of one that is unstable, values from which it is stable may follow
             keep_start(system, instances, self.known)
 
@@ -254,6 +268,7 @@ class _Tried:
         except UsageError as error:
             raise type(error)(f"{self._varied.of} = {value:g}: {error}") from None
         self._starts[value] = self.known.start
+        self.progress()
 
     def has_poles(self, value: float) -> bool:
         """Whether there are poles at a value; else `without` has the reason."""
@@ -300,15 +315,17 @@ class _Tried:
 def _crossings(loop: _Tried, tried: list[float], own: float | None) -> list[Crossing]:
     """Where poles cross, in rising order; raises `UsageError` where no value has poles."""
     crossings = list[Crossing | None]()
+    done = 0.0
     with progress_bar("poles") as report:
+        loop.progress = lambda: report(done)
         # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
         first = (tried[-1], own if own in tried else tried[0], tried[0])
         if not (any(map(loop.has_poles, first)) or isinstance(loop.without[tried[0]], NotAnEquilibriumError)):
             raise loop.without[tried[-1]]
         for place in range(len(tried) - 2, -1, -1):
             loop.has_poles(tried[place])
-            report(1.0 - place / len(tried))
             crossings.append(loop.crossing(tried[place], tried[place + 1]))
+            done = 1.0 - place / len(tried)
         if not loop.found:
             raise loop.without[tried[-1]]
         for below, value, above in zip(tried, tried[1:], [*tried[2:], math.nan]):  # near a rest that is known now
@@ -331,11 +348,10 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
                 return values
             return sorted([own, *(value for value in values if not math.isclose(value, own))])
 
-        every = with_own(span.values() if count is None else _spaced(span, count, np.linspace))
-        loop.rates = commensurate(loop.at, every)
-        geometric = loop.rates is None and is_wide(span.values()[0], span.last)
-        spaced = _spaced(span, count or COUNT, np.geomspace if geometric else np.linspace)
-        values = with_own(spaced) if loop.rates is None else loop.rates.scan
+        geometric = is_wide(span.values()[0], span.last)
+        every = with_own(_spaced(span, count or COUNT, np.geomspace if geometric else np.linspace))
+        loop.rates = commensurate(loop.at, every, instead=True)
+        values = every if loop.rates is None else loop.rates.scan
         if not values:
             raise UsageError(f"{varied.of}: several rates, which repeat together at no value of the range")
         crossings = _crossings(loop, _beside_jumps(varied, system, values), own)
@@ -353,6 +369,7 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
         curve=np.array([(x, loop.radius(x) if x in loop.found else math.nan) for x in tried]).T,
         in_double=are_in_double({name: one for name, (one, _, _) in loop.known.items()}),
         without=tuple(str(loop.without[value]) for value in refused),
+        moved=0 if loop.rates is None else loop.rates.moved, asked=None if loop.rates is None else len(every),
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Periods beside others, of a loop that repeats where all rates meet, and where it ceases to be stable between them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -16,6 +16,12 @@ from orchestration.theory.stability.operating_point import (
 
 MOST_MULTIPLES = 200
 """Most multiples of the other periods that are tried beside the values of the scan"""
+MOST_BETWEEN = 10_000
+"""Most values between two others that are looked at, those of the simplest ratios"""
+DIGITS, ROUNDING = 6, 1e-12
+"""Digits of such a value at most, so that it is the one that is printed, and what is no difference from it, relative"""
+NEAR = 1.0 / 64.0
+"""Distance from a value, relative, within which another is sought first"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,59 +29,123 @@ class Commensurate:
     """Values at which a loop of several rates repeats: of one that varies, only there it has a spectral radius."""
 
     scan: list[float]
-    """the scan's own that are, and multiples of the other periods, at which it may be unstable between stable ones"""
+    """the scan's own that are, and multiples of the other periods, at which it may be unstable between stable ones; or
+    one for each that was asked for, if not the same for two"""
     longest_first: list[float]
     """the same, the longest hyperperiod first: what is measured over a long one serves over shorter ones"""
-    fine: list[float]
-    """candidates between them"""
+    meetings: "Meetings"
+    """all that are"""
+    moved: int = 0
+    """how many of those asked for are none, so that another is in their place"""
 
 
-def commensurate(at: Callable[[float], System], values: Sequence[float]) -> Commensurate | None:
-    """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period."""
+class Meetings:
+    """All values of a period at which it meets others within `LONGEST_HYPERPERIOD` of the longest: by their ratios."""
+
+    def __init__(self, others: Sequence[Fraction], unit: float) -> None:
+        """The other periods [ns], and the value of the period by nanosecond."""
+        self._whole, self._longest, self._unit = hyperperiod(others), max(others), unit
+
+    def between(self, low: float, high: float) -> list[float]:
+        """Those from one value to another, in rising order."""
+        low, high = sorted((low, high))
+        size, found = float(self._whole) * self._unit, set[float]()
+        most = math.floor(LONGEST_HYPERPERIOD * self._longest / self._whole)  # of p, in a period that is p / q of all
+        largest = max(LONGEST_HYPERPERIOD, math.floor(LONGEST_HYPERPERIOD * float(self._longest) * self._unit / low))
+        for q in range(1, largest + 1):
+            first, last = (one * q / size for one in (low, high))
+            every = range(math.ceil(first - ROUNDING * first), math.floor(last + ROUNDING * last) + 1)
+            if q > LONGEST_HYPERPERIOD:
+                every = range(every.start, min(every.stop, most + 1))
+            for p in every[:: math.ceil(len(every) / MOST_BETWEEN) or 1]:
+                value = float(f"{size * p / q:.{DIGITS}g}")
+                if math.isclose(value, size * p / q, rel_tol=ROUNDING):
+                    found.add(value)
+            if len(found) > MOST_BETWEEN:
+                break
+        return sorted(found)
+
+    def instead(self, value: float, apart: float, first: float, last: float) -> float:
+        """The one that takes the place of a value in a range, where values lie `apart`.
+
+        Within half of that it is the one of the simplest ratio, else the nearest.
+        """
+        near = self.between(max(first, value - 0.5 * apart), min(last, value + 0.5 * apart))
+        if near:
+            return min(near, key=lambda one: (self.period_with(one), abs(one - value)))
+        share = NEAR
+        while not near and share < last / first:
+            near = self.between(max(first, value / (1.0 + share)), min(last, value * (1.0 + share)))
+            share *= 2.0
+        return min(near, key=lambda one: abs(one - value), default=math.nan)
+
+    def period_with(self, value: float) -> Fraction:
+        """The hyperperiod of a value and the others [ns]."""
+        return hyperperiod([self._whole, Fraction(f"{value / self._unit:.12g}")])
+
+
+def commensurate(
+    at: Callable[[float], System], values: Sequence[float], *, instead: bool = False
+) -> Commensurate | None:
+    """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period.
+
+    `instead`: one in the place of each value, and no multiples of the others between them.
+    """
     beside = beside_others(at, values[0], values[-1])
     if beside is None:
         return None
     others, unit = beside
+    meetings, first, last = Meetings(others, unit), values[0], values[-1]
 
     def multiples(period: Fraction) -> list[float]:
         step = float(period) * unit
-        counts = range(math.ceil(values[0] / step), math.floor(values[-1] / step) + 1)
-        return [float(f"{k * step:.12g}") for k in counts]
+        return [float(f"{k * step:.12g}") for k in range(math.ceil(first / step), math.floor(last / step) + 1)]
 
-    added = sorted({value for period in others for value in multiples(period)})
-    few = added[:: math.ceil(len(added) / MOST_MULTIPLES)] if added else added
-    repeats = {value: hyperperiod_of(at(value)) for value in sorted({*values, *few})}
-    known = {value: period for value, period in repeats.items() if period is not None}
+    def repeating(some: Iterable[float]) -> dict[float, Fraction]:
+        each = {value: hyperperiod_of(at(value)) for value in sorted(some)}
+        return {value: period for value, period in each.items() if period is not None}
+
+    if instead:
+        given, apart = repeating(values), (last - first) / (len(values) - 1)
+        others_of = {meetings.instead(one, apart, first, last) for one in values if one not in given}
+        known = repeating({*given, *(one for one in others_of if math.isfinite(one))})
+        moved = len(values) - len(given)
+    else:
+        added = sorted({value for period in others for value in multiples(period)})
+        few = added[:: math.ceil(len(added) / MOST_MULTIPLES)] if added else added
+        known, moved = repeating({*values, *few}), 0
     longest_first = sorted(known, key=known.__getitem__, reverse=True)
-    fine = multiples(hyperperiod(others) / LONGEST_HYPERPERIOD)
-    return Commensurate(scan=[*known], longest_first=longest_first, fine=fine)
+    return Commensurate(scan=[*known], longest_first=longest_first, meetings=meetings, moved=moved)
 
 
 def narrowed(grows: Callable[[float], bool], bracket: Bracket, rates: Commensurate) -> Bracket:
-    """The bracket bisected by the values of `fine` within it, until that before its good end is good, too.
+    """The bracket bisected by all values in it at which the rates meet, until that before its good end is good, too.
 
+    So has to be the one of the simplest ratio that it has passed by, where a loop is most often unstable by itself.
     Between values at which it is unstable, a loop may be stable at one, as at a multiple of another period.
     """
     good, bad = bracket
     assert good is not None
     down = bad < good
-    fine, scan = (sorted(values, reverse=down) for values in (rates.fine, rates.scan))
+    scan = sorted(rates.scan, reverse=down)
 
     def before(values: list[float], end: float) -> list[float]:
         return [x for x in values if (x > end if down else x < end)]
 
     while True:
-        between = [x for x in before(fine, bad) if before([good], x)]
+        begin = (before(scan, good) or [good])[-1]
+        fine = sorted(rates.meetings.between(begin, bad), reverse=down)
+        start, between = good, [x for x in before(fine, bad) if before([good], x)]
         while between:
             half = len(between) // 2
             if grows(between[half]):
                 bad, between = between[half], between[:half]
             else:
                 good, between = between[half], between[half + 1 :]
-        beside = before(fine, good)[-1:]
-        if not beside or not grows(beside[0]):
+        passed = before(fine, good)
+        simplest = sorted((x for x in passed if before([start], x)), key=rates.meetings.period_with)[:1]
+        unstable = next((x for x in (*simplest, *passed[-1:]) if grows(x)), None)
+        stable = None if unstable is None else next((x for x in reversed(before(scan, unstable)) if not grows(x)), None)
+        if unstable is None or stable is None:
             return Bracket(good, bad)
-        stable = next((x for x in reversed(before(scan, beside[0])) if not grows(x)), None)
-        if stable is None:
-            return Bracket(good, bad)
-        good, bad = stable, beside[0]
+        good, bad = stable, unstable

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.bisection import Range
-from orchestration.systems.system.component import Sampling
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import root_locus
@@ -21,6 +21,7 @@ from orchestration.theory.stability.loop_figures import _rows_of
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
 from orchestration.theory.stability.root_locus import Crossing, RootLocus
+from orchestration.theory.stability.several_rates import commensurate
 from orchestration.theory.stability.sign_changes import uncertainty
 from quadcosim import Timing, UsageError, bode, linearise, locus
 from tests.commands import Main
@@ -103,15 +104,19 @@ def test_a_state_in_a_small_unit_is_a_pole_too() -> None:
 
 
 def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> None:
-    """Within a twentieth of the other one, though both values of the locus are two of it apart."""
+    """Nearer than a twentieth of the other one, though both values of the locus are two of it apart.
+
+    At 12.8 ms, that of the simplest ratio near by, it is unstable by itself: stable again at 13 ms.
+    """
     system, period = example("dc_servo"), "components.controller.sampling.period"
     servo = dataclasses.replace(system.components["servo"], step=None, sampling=Sampling(period=0.008))
     both = dataclasses.replace(system, components={**system.components, "servo": servo})
     found = locus(both, period, first=0.008, last=0.024, count=2)
-    (crossing,) = found.crossings
-    assert crossing.leaves
-    assert crossing.until == pytest.approx(crossing.value + 0.0004)
-    assert f"leave between {1e3 * crossing.value:g} ms and {1e3 * crossing.until:g} ms (small" in found.verdict
+    crossing, *others = found.crossings
+    assert [(one.value, one.until, one.leaves) for one in others] == [(0.013, 0.0128, False), (0.013, 0.0132, True)]
+    assert (crossing.value, crossing.until, crossing.leaves) == (0.0125, 0.0128, True)
+    assert "leave between 12.5 ms and 12.8 ms; return between 12.8 ms and 13 ms; leave" in found.verdict
+    assert f"{found.tried} values tried, at which all rates repeat together" in found.verdict
     stable, unstable = (
         linearise(changed(both, {period: value}), "controller") for value in (crossing.value, crossing.until)
     )
@@ -126,8 +131,24 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
         lambda value: changed(both, {period: value}), Range(first=0.008, step=0.016, last=0.024, tolerance=1.0)
     )
     assert crossing.turn == pytest.approx(2e9 * np.pi / float(of_all))
-    assert (limit.limit, limit.accuracy) == pytest.approx((crossing.value + 0.0002, 0.0002), rel=1e-6)
+    assert (limit.limit, limit.accuracy) == pytest.approx((0.01265, 0.00015), rel=1e-6)
     assert per_longest == pytest.approx(after ** (1e9 * max(crossing.until, 0.008) / float(of_all)), rel=1e-6)
+
+
+def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None:
+    """That of the simplest ratio within half a step, where there is one; else the nearest, as 12 / 25 of 2 ms."""
+
+    def two(period: float) -> System:
+        each = {"law": period, "servo": 0.002}
+        samplings = {name: Component(fmu=f"{name}.fmu", sampling=Sampling(period=x)) for name, x in each.items()}
+        return System(stop_time=9.0, components=samplings)
+
+    rates = commensurate(two, [0.0009, 0.00093, 0.000961, 0.000979, 0.001], instead=True)
+    assert rates is not None
+    assert (rates.scan, rates.moved) == ([0.0009, 0.0009375, 0.00096, 0.001], 3)
+    assert rates.meetings.between(0.00094, 0.00099) == [0.00095, 0.00096]
+    assert rates.meetings.between(0.0041, 0.0044) == [0.0041, 0.004125, 0.0042, 0.00425, 0.0043, 0.004375, 0.0044]
+    assert all(hyperperiod_of(two(value)) is not None for value in rates.meetings.between(0.0002, 0.03))
 
 
 def test_a_locus_of_one_value_is_refused() -> None:
