@@ -77,7 +77,7 @@ def status(study: StudyFile, out: Out = None) -> CommandResult:
         total = int(about.get(TOTAL, "0"))
     done, failed = counts.get("done", 0), counts.get("failed", 0)
     missing = total - done - failed
-    agreement = LaneAgreement.from_text(about[AGREEMENT]) if AGREEMENT in about else None
+    agreement = LaneAgreement.from_text(about[AGREEMENT]) if about.get(AGREEMENT) else None
     then = f"; {_sweep_command(study, out)} runs them" if missing else ""
     lines = [f"{path}: {done + failed} of {total} runs, {failed} failed, {missing} missing{then}"]
     if agreement is not None:

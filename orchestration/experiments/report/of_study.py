@@ -348,5 +348,5 @@ def provenance_of(about: Mapping[str, str]) -> list[tuple[str, str]]:
         each = {"": guid} if isinstance(guid, str) else {f" {', '.join(map(str, at))}": one for at, one in guid["of"]}
         guids |= {f"GUID of the {name}{at}": text for at, text in each.items()}
     machine = {"machine": str(place["machine"])} if "machine" in place else {}
-    agreement = {"lanes": str(LaneAgreement.from_text(about[AGREEMENT]))} if AGREEMENT in about else {}
+    agreement = {"lanes": str(LaneAgreement.from_text(about[AGREEMENT]))} if about.get(AGREEMENT) else {}
     return [*versions.items(), *guids.items(), *machine.items(), *agreement.items()]

@@ -34,7 +34,7 @@ from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
 from orchestration.simulation.runs.result import Result
-from orchestration.simulation.workers.batching import Sample, chunks
+from orchestration.simulation.workers.batching import LaneAgreement, Sample, chunks
 from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution
 from orchestration.simulation.workers.executors import (
     TaskRunner,
@@ -55,7 +55,7 @@ Announce = Callable[[str], None]
 
 TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
 ENGINE, AGREEMENT = "engine", "agreement"
-"""Names of entries of a store: the engine used last, and the agreement of runs in lanes with their FMUs"""
+"""Names of entries of a store: the engine used last, and the agreement of runs in lanes with their FMUs; empty: open"""
 _ANNOUNCED = 3
 """Largest number of failed runs that are announced"""
 
@@ -119,9 +119,9 @@ def sweep(
         if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
             warn(warning)
         sweep_progress = _Progress(study, missing, report, announce)
-        agreement = None
-        if len(missing):
-            opened.describe({ENGINE: execution.name})
+        sample, agreement = _not_known_to_agree(opened) if execution.in_lanes else Sample(), None
+        if len(missing) or sample.runs:
+            opened.describe({ENGINE: execution.name, AGREEMENT: ""})
             if announce is not None and engine == "auto":
                 execution.tell(announce)
             elif announce is not None and (slow := [fmu for fmu in files.fmus if native_twin(fmu) != fmu]):
@@ -130,8 +130,7 @@ def sweep(
                     "--engine auto is fast, by native twins, in another folder, --out"
                 )
             task_of = partial(_task, study, files.start_values, time_limit)
-            sample, chunk = Sample(), partial(chunks, total=len(missing), workers=workers)
-            windows = _windows(opened, missing[:, 0])
+            chunk, windows = partial(chunks, total=len(missing), workers=workers), _windows(opened, missing[:, 0])
             tasks: Iterable[RunTask | TaskBatch]
             if execution.in_lanes:
                 tasks = _in_lanes(columns, windows, partial(task_of, engine=None), time_limit, chunk)
@@ -285,6 +284,14 @@ def _missing(opened: store.Store, study: Study, retry_failed: bool) -> Integers:
     ]
     both = np.concatenate([missing, np.array(without_signals, dtype=np.int64).reshape(-1, 2)])
     return both[np.unique(both[:, 0], return_index=True)[1]]
+
+
+def _not_known_to_agree(opened: store.Store) -> Sample:
+    """A sample of the runs in lanes of a store; empty where runs have agreed, with none added since."""
+    sample, before = Sample(), opened.about().get(AGREEMENT)
+    if not before or not LaneAgreement.from_text(before).agrees:
+        sample.add_stored(opened.rows(), opened.metrics)
+    return sample
 
 
 def _signals_path(opened: store.Store, key: str) -> Path:

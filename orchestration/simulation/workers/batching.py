@@ -59,17 +59,30 @@ class Sample:
     def add(self, rows: Rows) -> None:
         """Consider rows, of which those in lanes may be chosen."""
         for place, (key, engine) in enumerate(zip(rows.key, rows.results.engines)):
-            if engine != BATCH:
-                continue
-            digest = hashlib.sha256(f"sample {key}".encode()).digest()
-            if len(self._chosen) < SAMPLE or digest < self._chosen[-1][0]:
-                self._chosen = sorted([*self._chosen, (digest, key, Repeated.of(rows, place))], key=lambda run: run[:2])
-                del self._chosen[SAMPLE:]
+            if self._wants(key, engine):
+                self._choose(key, Repeated.of(rows, place))
+
+    def add_stored(self, rows: Iterable[Mapping[str, Any]], metrics: Iterable[str]) -> None:
+        """Likewise the rows of a store, by column."""
+        for row in rows:
+            if self._wants(row["key"], row["engine"]):
+                self._choose(row["key"], Repeated(row["design_index"], {name: row[name] for name in metrics}))
+
+    def _wants(self, key: str, engine: str | None) -> bool:
+        return engine == BATCH and (len(self._chosen) < SAMPLE or _digest(key) < self._chosen[-1][0])
+
+    def _choose(self, key: str, run: "Repeated") -> None:
+        others = (one for one in self._chosen if one[1] != key)
+        self._chosen = sorted([*others, (_digest(key), key, run)], key=lambda one: one[:2])[:SAMPLE]
 
     @property
     def runs(self) -> dict[str, "Repeated"]:
         """Those that are chosen so far, by key, sorted."""
         return {key: run for _, key, run in sorted(self._chosen, key=lambda run: run[1])}
+
+
+def _digest(key: str) -> bytes:
+    return hashlib.sha256(f"sample {key}".encode()).digest()
 
 
 class Repeated(NamedTuple):

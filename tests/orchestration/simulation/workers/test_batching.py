@@ -12,6 +12,7 @@ from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
 from orchestration.experiments.studies.sweep import AGREEMENT
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
+from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.processes.child import Died, Ending
 from orchestration.simulation.engines.batch.batches import Batches
 from orchestration.simulation.workers.batching import SAMPLE, LaneAgreement, Sample, batched, chunks
@@ -78,6 +79,32 @@ def test_a_sweep_continues_and_repeats_no_run(tmp_path: Path) -> None:
     summary = sweep(more, out=tmp_path, engine="batch")
     assert (summary.flown, summary.total) == (1, 3)
     assert sweep(more, out=tmp_path, engine="batch").agreement is None
+
+
+def test_runs_that_are_not_known_to_agree_are_compared_by_the_next_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    some, repeated = study(axis("timing.period", 0.01, 0.02)), list[int]()
+    more = study(axis("timing.period", 0.01, 0.02, 0.03))
+    differs, agrees = LaneAgreement.of([(0, {"x": 1.0}, {"x": 2.0})]), LaneAgreement.of([])
+    found = iter([None, differs, agrees])
+
+    def compared(sample: Sample, *_: object, **__: object) -> LaneAgreement:
+        repeated.append(len(sample.runs))
+        assert all("good" in one.metrics and one.run in range(3) for one in sample.runs.values())
+        if (one := next(found)) is None:
+            raise KeyboardInterrupt
+        return one
+
+    monkeypatch.setattr("orchestration.experiments.studies.sweep.lane_agreement", compared)
+    with pytest.raises(Interrupted):
+        sweep(some, out=tmp_path, engine="batch")
+    with pytest.raises(QuadcosimError, match="in lanes differs"):
+        sweep(more, out=tmp_path, engine="batch")
+    summary = sweep(more, out=tmp_path, engine="batch")
+    assert (summary.flown, summary.agreement) == (0, agrees)
+    assert sweep(more, out=tmp_path, engine="batch").agreement is None
+    assert repeated == [2, 3, 3]
 
 
 def test_a_run_that_its_fmus_refuse_has_the_same_row_as_outside_of_lanes(tmp_path: Path) -> None:
