@@ -65,13 +65,14 @@ class Meetings:
                 break
         return sorted(found)
 
-    def instead(self, value: float, apart: float, first: float, last: float) -> float:
-        """The one that takes the place of a value in a range, where values lie `apart`.
+    def instead(self, values: Sequence[float], k: int) -> float:
+        """The one that takes the place of value `k` of some in rising order.
 
-        Within half of that it is the one of the simplest ratio, else the nearest.
+        Within half of the way to its neighbours it is the one of the simplest ratio, else the nearest; NaN: none.
         """
-        near = self.between(max(first, value - 0.5 * apart), min(last, value + 0.5 * apart))
-        if near:
+        value, (first, last) = values[k], (values[0], values[-1])
+        below, above = (0.5 * (value + values[min(max(0, each), len(values) - 1)]) for each in (k - 1, k + 1))
+        if near := self.between(below, above):
             return min(near, key=lambda one: (self.period_with(one), abs(one - value)))
         share = NEAR
         while not near and share < last / first:
@@ -106,9 +107,9 @@ def commensurate(
         return {value: period for value, period in each.items() if period is not None}
 
     if instead:
-        given, apart = repeating(values), (last - first) / (len(values) - 1)
-        others_of = {meetings.instead(one, apart, first, last) for one in values if one not in given}
-        known = repeating({*given, *(one for one in others_of if math.isfinite(one))})
+        given = repeating(values)
+        others_of = {meetings.instead(values, k) for k, one in enumerate(values) if one not in given}
+        known = repeating({*given, *filter(math.isfinite, others_of)})
         moved = len(values) - len(given)
     else:
         added = sorted({value for period in others for value in multiples(period)})

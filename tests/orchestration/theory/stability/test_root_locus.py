@@ -146,6 +146,9 @@ def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None
     rates = commensurate(two, [0.0009, 0.00093, 0.000961, 0.000979, 0.001], instead=True)
     assert rates is not None
     assert (rates.scan, rates.moved) == ([0.0009, 0.0009375, 0.00096, 0.001], 3)
+    wide = commensurate(two, [0.0002, 0.000356, 0.000632, 0.00112, 0.002, 0.00356, 0.02], instead=True)
+    assert wide is not None
+    assert wide.scan == [0.0002, 0.0004, 0.0005, 0.00112, 0.002, 0.004, 0.02]
     assert rates.meetings.between(0.00094, 0.00099) == [0.00095, 0.00096]
     assert rates.meetings.between(0.0041, 0.0044) == [0.0041, 0.004125, 0.0042, 0.00425, 0.0043, 0.004375, 0.0044]
     assert all(hyperperiod_of(two(value)) is not None for value in rates.meetings.between(0.0002, 0.03))
