@@ -262,6 +262,10 @@ def _license_of_pythonfmu() -> str:
     return text
 
 
+REMARK = "# "
+"""What a printed line begins with that is not the path of a file"""
+
+
 def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) -> int:
     """`python -m fmu_kit.packaging FOLDER [--root ROOT] [--variant TEXT] MODULE:CLASS …`: build each, print its path.
 

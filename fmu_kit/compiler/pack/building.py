@@ -32,7 +32,7 @@ from fmu_kit.compiler.runtime import FOLDER
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.tracing import Program, trace
 from fmu_kit.documentation import BuildNotes
-from fmu_kit.packaging import add_description, insert_guid, licences_and_icon, origin, slave_class, write_fmu
+from fmu_kit.packaging import REMARK, add_description, insert_guid, licences_and_icon, origin, slave_class, write_fmu
 from fmu_kit.write_description import GUID_PLACEHOLDER
 
 BESIDE = ("exchange.h", "instance.h", "integers.h", "lanes.c", "lanes.h", "mathematics.h", "text.h")
@@ -50,6 +50,8 @@ OPTIMISED = """
 #pragma GCC pop_options
 #endif
 """
+LONG = 10_000
+"""Operations and statements of a slave that take long to compile"""
 _NEEDS = FOLDER / "needs.html"
 _PYTHON = "python"
 """The folder of the documentation with the Python from which the C was generated."""
@@ -74,6 +76,10 @@ def build(
     standard = CLOCKED if clocked else STANDARDS[version]
     try:
         program = precompute(trace(slave_class(target), modules_of(target)))
+        if (size := program.size()) > LONG:
+            print(
+                f"{REMARK}{target.name}: compiling {size} operations and statements, which may take minutes", flush=True
+            )
         sources = c_sources(program, GUID_PLACEHOLDER, standard)
     except TraceError as error:
         raise PackagingError(f"{target.name}: {error}") from error

@@ -85,6 +85,7 @@ class Explorer:
         self._depth = 0
         self._catches = False
         self._traced: dict[Any, tuple[Function, Any, Any]] = {}
+        self._paths = 0
 
     def install_hooks(self) -> None:
         """Have the symbols call this explorer."""
@@ -166,6 +167,9 @@ class Explorer:
             runs += 1
             if runs > MAX_PATHS:
                 raise TraceError(_TOO_MANY)
+            self._paths += 1
+            if self._paths > MAX_SIZE:
+                raise TraceError(f"more than {MAX_SIZE} paths through all functions: {FEWER}")
             path = self._path = _Path(script, dict(outer.known) if outer else {})
             leaf = None
             try:
@@ -356,6 +360,9 @@ class Explorer:
 
 MAX_PATHS = 2000
 """Limit of the paths through one function; more would take minutes."""
+MAX_SIZE = 50_000
+"""Limit of the paths through all functions, and of their operations and statements; more would take minutes."""
+FEWER = "expected a loop by fmu_kit.scalar.repeat, and methods for ifs that follow one another"
 MAX_ROUNDS = 200
 """Limit of the rounds of a `while` with a computed condition: such a loop does not end while it is traced."""
 _TOO_MANY = f"more than {MAX_PATHS} paths: expected fewer conditions that depend on each other"

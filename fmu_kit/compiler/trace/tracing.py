@@ -23,7 +23,7 @@ from fmu_kit import scalar
 from fmu_kit.compiler.trace import symbolic_builtins as stand_ins
 from fmu_kit.compiler.trace.errors import TraceError
 from fmu_kit.compiler.trace.memory import KnownMemory, Memory, attribute_name
-from fmu_kit.compiler.trace.path_exploration import Explorer
+from fmu_kit.compiler.trace.path_exploration import FEWER, MAX_SIZE, Explorer
 from fmu_kit.compiler.trace.statements import Function, Place, Statement, all_statements, used_symbols
 from fmu_kit.compiler.trace.symbols import Kind, Symbol, constant, hooks
 from fmu_kit.compiler.trace.tree import leaves
@@ -64,6 +64,11 @@ class Program:
     states: tuple[tuple[int, Place], ...] = ()
     """the continuous states, each with the number of its derivative among the results"""
 
+    def size(self) -> int:
+        """The number of its operations and statements."""
+        written = [[*all_statements(function.body)] for function in (*self.functions, *self.of_derivatives)]
+        return sum(len(each) + sum(bool(symbol.args) for symbol in used_symbols(each).values()) for each in written)
+
 
 def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 53) -> Program:
     """The program of a slave class; `modules` are its own and all that it uses.
@@ -79,6 +84,8 @@ def trace(slave: type[Slave], modules: list[types.ModuleType], *, digits: int = 
         memory = Memory(slave(instance_name="traced"), kinds, known)
         try:
             program = _traced(slave, modules, memory)
+            if (size := program.size()) > MAX_SIZE:
+                raise TraceError(f"{size} operations and statements, at most {MAX_SIZE}: {FEWER}")
         except Exception as error:
             raise TraceError(f"{_place(error)}{error}") from error
         found = {name: place.kind for name, place in memory.places.items() if place.reference is None}

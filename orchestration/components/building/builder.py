@@ -233,8 +233,8 @@ def build_slaves(
     """Build slaves whose modules are in one folder into `folder`, in a separate process; returns the FMUs' paths.
 
     FMUs without Python inside are for this machine, or for `systems`: `all` or a list with commas. `announce` receives
-    a line for each file that could not be packed, `progress` the share that is built. Raises `QuadcosimError` with the
-    last line of the build's output if it fails.
+    a line for each file that could not be packed, and for what takes long, `progress` the share that is built. Raises
+    `QuadcosimError` with the last line of the build's output if it fails.
     """
     options = [] if systems is None else ["--target", systems]
     paths = _run_packer([*packing.command, *options], targets, folder, announce, progress)
@@ -286,6 +286,10 @@ def _run_packer(
             whole, stdout=subprocess.PIPE, stderr=remarks, text=True, env=subprocesses.environment()
         ) as process:
             for line in process.stdout or ():
+                if line.startswith(packaging.REMARK):
+                    if announce is not None:
+                        announce(line.removeprefix(packaging.REMARK).rstrip("\n"))
+                    continue
                 paths.append(Path(line.rstrip("\n")))
                 if progress is not None:
                     progress(len(paths) / len(targets))

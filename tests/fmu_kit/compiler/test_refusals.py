@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from fmu_kit.bundle import PackagingError, Target
+from fmu_kit.compiler.pack import building
 from fmu_kit.compiler.pack.building import build
+from fmu_kit.compiler.trace.errors import TraceError
 
 SLAVE = """\
 import math
@@ -196,6 +198,42 @@ def halved(x):
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", "self.y = halved(a)") + method
     path, message = refusal(tmp_path, monkeypatch, text)
     assert message.startswith(f"Refused: {path}, line {line_of(path, '# enough')}: while: more than 200 rounds")
+
+
+@pytest.mark.parametrize(
+    ("module", "statement", "words"),
+    [
+        ("tracing", "self.y = sum(a * k for k in range(300))", r"6\d\d operations and statements, at most 500"),
+        (
+            "path_exploration",
+            "self.y = sum(1.0 if a > k else 0.0 for k in range(9))",
+            "more than 500 paths through all functions",
+        ),
+    ],
+)
+def test_what_would_take_minutes_to_compile_is_refused_by_its_size(
+    module: str, statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"fmu_kit.compiler.trace.{module}.MAX_SIZE", 500)
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", statement)
+    _, message = refusal(tmp_path, monkeypatch, text)
+    assert re.search(f"{words}: expected a loop by fmu_kit.scalar.repeat, and methods for ifs that follow", message)
+    assert "\n" not in message
+
+
+def test_what_takes_long_to_compile_is_announced_by_its_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*given: object) -> None:
+        raise TraceError("stopped before it is compiled")
+
+    monkeypatch.setattr(building, "LONG", 100)
+    monkeypatch.setattr(building, "c_sources", stop)
+    text = SLAVE.replace("{initialise}", "pass").replace("{step}", "self.y = sum(a * k for k in range(300))")
+    refusal(tmp_path, monkeypatch, text)
+    assert re.match(
+        r"# Refused: compiling 6\d\d operations and statements, which may take min", capsys.readouterr().out
+    )
 
 
 @pytest.mark.parametrize("name", ["get_real", "terminate", "_initialise"])

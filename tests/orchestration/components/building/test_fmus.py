@@ -180,11 +180,12 @@ def test_a_build_that_fails_says_why_in_one_line(tmp_path: Path, monkeypatch: py
 
 
 def test_a_build_says_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    builds_by("print('a.fmu'); print('b.fmu')", monkeypatch)
-    reported: list[float] = []
+    builds_by("print('a.fmu'); print('# B: compiling'); print('b.fmu')", monkeypatch)
+    reported: list[float | str] = []
     slaves = [Target("lamps", "A"), Target("lamps", "B")]
-    assert builder.build_slaves(slaves, tmp_path, progress=reported.append) == [Path("a.fmu"), Path("b.fmu")]
-    assert reported == [0.5, 1.0]
+    built = builder.build_slaves(slaves, tmp_path, reported.append, progress=reported.append)
+    assert built == [Path("a.fmu"), Path("b.fmu")]
+    assert reported == [0.5, "B: compiling", 1.0]
 
 
 # -- slaves of anybody ------------------------------------------------------------------------------------
