@@ -3,6 +3,7 @@
 import keyword
 import re
 from collections.abc import Container
+from dataclasses import replace
 from pathlib import Path
 
 from fmu_kit.units import base_unit_exponents
@@ -39,6 +40,7 @@ def texts_for(fmu: str, plant: Model, folder: Path, *, in_c: bool = False) -> di
     )
     if not (taken and set_):
         raise UsageError(f"--for {fmu}: {plant.name} has no {'inputs' if taken else 'outputs'}; expected a plant")
+    taken = [_as_begun(v, plant) for v in taken]
     called, law = (_in_c if in_c else _in_python)(fmu, taken, set_)
     step = experiment(plant, "stepSize")
     return {
@@ -133,6 +135,12 @@ def _mapped(variable: Variable, name: str, c: str, what: str) -> str:
 def _field(variable: Variable, field: str) -> str:
     """The line of a struct that declares a variable; its unit cannot end the comment."""
     return f"    double {field};" + (f" /* {variable.unit.replace('*/', '* /')} */" if variable.unit else "")
+
+
+def _as_begun(output: Variable, plant: Model) -> Variable:
+    """An output with the start value of the state that it is, which slaves have as a parameter `initial.NAME`."""
+    state = plant.variables.get(f"initial.{output.name}")
+    return output if output.start is not None or state is None else replace(output, start=state.start)
 
 
 def _start(variable: Variable) -> float | bool:

@@ -64,6 +64,12 @@ def test_one_in_c_flies_and_commands_what_its_step_says(tmp_path: Path, main: Ma
     assert re.search(r"opened +0.25\b", main("run", system, "--stop-time", "0.1").stdout)
 
 
+def test_a_measured_state_starts_as_it_does_in_the_plant(tmp_path: Path, main: Main) -> None:
+    servo = EXAMPLES / "dc_servo" / "Servo.fmu"
+    law, *_ = main("new", "controller", "law", "--for", servo, "--out", tmp_path).stdout.split()
+    assert '"angle of the shaft", "rad", 1.0)' in Path(law).read_text(encoding="utf-8")
+
+
 def test_a_name_that_every_slave_has_is_known() -> None:
     own = {name for name in (*dir(Slave), *Slave.__annotations__, *PYTHONFMU_NAMES) if not name.startswith("_")}
     assert own <= set(OF_SLAVES.split())
