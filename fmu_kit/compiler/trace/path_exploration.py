@@ -64,6 +64,8 @@ class _Path:
 
     script: tuple[bool, ...]
     known: dict[int, bool]
+    refusal: str
+    """why it is one path too many, which is said at its first condition; empty: it is not"""
     entries: list[Statement | _Fork] = field(default_factory=list)
     taken: list[bool] = field(default_factory=list)
 
@@ -126,6 +128,8 @@ class Explorer:
         path = self._current
         if id(condition) in path.known:
             return path.known[id(condition)]
+        if path.refusal:
+            raise TraceError(path.refusal)
         at = len(path.taken)
         _expect_termination(at)
         branch_taken = path.script[at] if at < len(path.script) else True
@@ -165,12 +169,9 @@ class Explorer:
             if runs:
                 restore()
             runs += 1
-            if runs > MAX_PATHS:
-                raise TraceError(_TOO_MANY)
             self._paths += 1
-            if self._paths > MAX_SIZE:
-                raise TraceError(f"more than {MAX_SIZE} paths through all functions: {FEWER}")
-            path = self._path = _Path(script, dict(outer.known) if outer else {})
+            refusal = _TOO_MANY if runs > MAX_PATHS else _FAR_TOO_MANY if self._paths > MAX_SIZE else ""
+            path = self._path = _Path(script, dict(outer.known) if outer else {}, refusal)
             leaf = None
             try:
                 value = body()
@@ -365,7 +366,8 @@ MAX_SIZE = 50_000
 FEWER = "expected a loop by fmu_kit.scalar.repeat, and methods for ifs that follow one another"
 MAX_ROUNDS = 200
 """Limit of the rounds of a `while` with a computed condition: such a loop does not end while it is traced."""
-_TOO_MANY = f"more than {MAX_PATHS} paths: expected fewer conditions that depend on each other"
+_TOO_MANY = f"more than {MAX_PATHS} paths through this function: {FEWER}"
+_FAR_TOO_MANY = f"more than {MAX_SIZE} paths through all functions: {FEWER}"
 
 
 def _expect_termination(forks: int) -> None:

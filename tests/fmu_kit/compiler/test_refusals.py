@@ -117,6 +117,7 @@ IN_A_STEP = [
     ("self.y = all(self._changing(x) for x in (a, t))", "all() of values of which a later one may fail"),
     ("self.y = any(1.0 / x > 2.0 for x in (a, t, h))", "any() of values of which a later one may fail"),
 ]
+ADDED_IFS = "self.y = sum(1.0 if a > k else 0.0 for k in range(9))"
 IN_INITIALISE = [
     ("self._queue = deque([0.0])", "deque: expected numbers in tuples, lists, dictionaries and objects"),
     ("self._one = self._other = Helper(t)", "self._one and self._other are one Helper: expected separate objects"),
@@ -201,23 +202,21 @@ def halved(x):
 
 
 @pytest.mark.parametrize(
-    ("module", "statement", "words"),
+    ("limit", "statement", "words"),
     [
-        ("tracing", "self.y = sum(a * k for k in range(300))", r"6\d\d operations and statements, at most 500"),
-        (
-            "path_exploration",
-            "self.y = sum(1.0 if a > k else 0.0 for k in range(9))",
-            "more than 500 paths through all functions",
-        ),
+        ("tracing.MAX_SIZE", "self.y = sum(a * k for k in range(300))", r"6\d\d operations and statements, at most 5"),
+        ("path_exploration.MAX_SIZE", ADDED_IFS, "line {line}: more than 50000 paths through all functions: "),
+        ("path_exploration.MAX_PATHS", ADDED_IFS, "line {line}: more than 2000 paths through this function: "),
     ],
 )
 def test_what_would_take_minutes_to_compile_is_refused_by_its_size(
-    module: str, statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    limit: str, statement: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(f"fmu_kit.compiler.trace.{module}.MAX_SIZE", 500)
+    monkeypatch.setattr(f"fmu_kit.compiler.trace.{limit}", 500)
     text = SLAVE.replace("{initialise}", "pass").replace("{step}", statement)
-    _, message = refusal(tmp_path, monkeypatch, text)
-    assert re.search(f"{words}: expected a loop by fmu_kit.scalar.repeat, and methods for ifs that follow", message)
+    path, message = refusal(tmp_path, monkeypatch, text)
+    assert re.search(words.format(line=line_of(path, statement)), message)
+    assert message.endswith("expected a loop by fmu_kit.scalar.repeat, and methods for ifs that follow one another")
     assert "\n" not in message
 
 
