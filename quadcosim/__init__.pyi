@@ -71,6 +71,8 @@ from orchestration.theory.certificates.region import Region as Region
 from orchestration.theory.certificates.region import margin_region as margin_region
 from orchestration.theory.exact.expect import Expected as Expected
 from orchestration.theory.exact.expect import expect as expect
+from orchestration.theory.stability.closed_loop_step import StepResponse as StepResponse
+from orchestration.theory.stability.closed_loop_step import step_response as step_response
 from orchestration.theory.stability.frequency import Bode as Bode
 from orchestration.theory.stability.frequency import bode as bode
 from orchestration.theory.stability.linearise import Linearised as Linearised

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 from orchestration.command.flags import FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.terminal import in_columns, inform
 from orchestration.foundation.basics.unit_algebra import quantity
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.style import Figures
+    from orchestration.systems.system.request import Request
 
 Cut = Annotated[
     str | None,
@@ -38,7 +40,7 @@ def bode(
 
     found = response_of(request_from(scenario, flags, timing), component)
     if out is not None:
-        _draw(found.plot(), out)
+        _draw(found.plot(), out, _owner(found.outputs[0]))
     rows = [("loop", "gain margin", "phase margin", "delay margin", "crossover", "peak of sensitivity")]
     for loop in found.loops:
         phase, delay, crossover = loop.phase_margin, loop.delay_margin, loop.crossover
@@ -72,17 +74,31 @@ def bode(
 def step(
     scenario: ScenarioFile = None,
     timing: Timing = None,
+    to: Annotated[
+        str | None,
+        option("--to", "The source, or input, that steps by 1, the loop closed; with --of.", "SOURCE|COMPONENT.INPUT"),
+    ] = None,
+    of: Annotated[
+        str | None, option("--of", "The output whose response to it is computed.", "COMPONENT.OUTPUT")
+    ] = None,
     component: Cut = None,
     out: Folder = None,
     *,
     flags: FlightFlags,
 ) -> CommandResult:
-    """Compute how each command's loop takes back a step that is added to the command; draw it."""
+    """Compute how an output follows a step of an input, the loop closed; draw it.
+
+    Without --to and --of: how each command's loop takes back a step that is added to the command.
+    """
     from orchestration.theory.stability.step_response import step as response_of
 
+    if to is not None or of is not None:
+        if to is None or of is None or component is not None:
+            raise UsageError("step: expected --to and --of together, without --component, which cuts the loop open")
+        return _closed_loop_step(request_from(scenario, flags, timing), to, of, out)
     found = response_of(request_from(scenario, flags, timing), component)
     if out is not None:
-        _draw(found.plot(), out)
+        _draw(found.plot(), out, _owner(found.loops[0].output))
     rows = [("loop", "rise time", "overshoot", "settling time", "final value")]
     for loop in found.loops:
         rise = "-" if loop.rise_time is None else quantity(loop.rise_time, "s")
@@ -96,6 +112,17 @@ def step(
     }
     lines = list(in_columns(rows, right=True))
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
+
+
+def _closed_loop_step(request: "Request", to: str, of: str, out: Path | None) -> CommandResult:
+    from orchestration.theory.stability.closed_loop_step import step_response
+
+    found = step_response(request, to=to, of=of)
+    if out is not None:
+        _draw(found.plot(), out, f"{to}_{of}")
+    left_out = ("times", "response", "is_held", "in_double")
+    document = {key: value for key, value in vars(found).items() if key not in left_out}
+    return CommandResult(document=document, verdict=found.verdict, lines=[])
 
 
 @flight_options
@@ -118,7 +145,7 @@ def locus(
 
     found = locus_of(request_from(scenario, flags, timing), of, first=first, last=last, count=count)
     if out is not None:
-        _draw(found.plot(), out)
+        _draw(found.plot(), out, found.of)
     rows = [("crossing", "value", "accuracy", "pole")]
     for one in found.crossings:
         way = "leaves" if one.leaves else "returns"
@@ -147,6 +174,13 @@ def locus(
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
-def _draw(figures: "Figures", out: Path) -> None:
-    for path in figures.save(out):
+def _owner(output: str) -> str:
+    from orchestration.systems.system.connection import component_of
+
+    return component_of(output)
+
+
+def _draw(figures: "Figures", out: Path, of: str) -> None:
+    """Draw a figure in a file that is named by what it is of, so that one of another is not replaced."""
+    for path in figures.save(out, of):
         inform(str(path))

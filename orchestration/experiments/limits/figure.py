@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.simulation.figures.lines import plain
 from orchestration.simulation.figures.palette import BLUE, GREY, ORANGE, RED
-from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.figures.style import SCREEN, Style, named_by
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results import quantities
 from orchestration.simulation.results.quantities import Quantity
@@ -163,8 +162,7 @@ def _with_margin(values: list[float]) -> tuple[float, float]:
 
 def draw_limit(request: Request, result: Limit, folder: Path, style: Style = SCREEN) -> list[Path]:
     """Draw the measurements with both limits, and the spectral radius where a linear loop is known; the paths."""
-    name = "limit_" + re.sub(r"[^A-Za-z0-9]+", "_", result.of).strip("_")
-    written = figures.save(lambda chosen: limit_figure(result, chosen), folder / name, style)
+    written = figures.save(lambda chosen: limit_figure(result, chosen), folder / named_by("limit", result.of), style)
     with contextlib.suppress(UsageError, LostError):  # linear theory does not apply, or its process is lost
         written += draw_spectral_radius(request, result, folder, style)
     return written

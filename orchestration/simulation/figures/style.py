@@ -4,6 +4,7 @@ import base64
 import functools
 import html
 import io
+import re
 import textwrap
 import warnings
 from collections.abc import Iterator, Mapping
@@ -157,6 +158,11 @@ _UNDATED: Mapping[str, dict[str, str | None]] = {
 }
 
 
+def named_by(name: str, of: str) -> str:
+    """The name of the file of a figure of a quantity, a component or a signal."""
+    return re.sub(r"[^A-Za-z0-9]+", "_", f"{name}_{of}").strip("_") if of else name
+
+
 def save(
     figures: Mapping[str, Figure],
     folder: Path,
@@ -250,6 +256,6 @@ class Figures(Mapping[str, Figure]):
             write(figure, file, "png")
         return base64.b64encode(file.getvalue()).decode()
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write them into a folder, each as NAME.png and NAME.svg; their paths."""
-        return save(self, Path(folder), self._style)
+    def save(self, folder: str | Path, of: str = "") -> list[Path]:
+        """Write them into a folder, each as NAME.png and NAME.svg, `of` a quantity as NAME_OF; their paths."""
+        return save({named_by(name, of): figure for name, figure in self.items()}, Path(folder), self._style)

@@ -106,7 +106,7 @@ class LiftedTangent(LinearSimulator):
     def step(self, t: float, h: float) -> None:
         """As `Simulator`: the next sample, whatever the time."""
         by_state, by_input = self.whole.derivatives(self.samples * h)
-        self._given[self.sample] = self.input
+        self._given[self.sample] = self.input + self.added
         given, count = np.concatenate(self._given[: self.sample + 1]), len(self.outputs)
         rows = slice(self.sample * count, (self.sample + 1) * count)
         self.output[:] = by_state[rows] @ self.state + by_input[rows, : len(given)] @ given

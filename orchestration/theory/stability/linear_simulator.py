@@ -18,6 +18,8 @@ class LinearSimulator:
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
         self.state: Floats = np.zeros(states)
         self.input: Floats = np.zeros(len(inputs))
+        self.added: Floats = np.zeros(len(inputs))
+        """What is added to its inputs, connected or not"""
         self.output: Floats = np.zeros(len(outputs))
         self.sample = 0
         """The number of the next sample, from a begin of the loop's period, of one whose samples differ"""
@@ -25,8 +27,8 @@ class LinearSimulator:
     def abreast(self: S, runs: int) -> S:
         """The same at rest, for some runs together: each number is a row of theirs."""
         other = copy(self)
-        other.state, other.input, other.output = (
-            np.zeros((len(x), runs)) for x in (self.state, self.input, self.output)
+        other.state, other.input, other.added, other.output = (
+            np.zeros((len(x), runs)) for x in (self.state, self.input, self.added, self.output)
         )
         other.sample = 0
         return other

@@ -98,7 +98,7 @@ class Tangent(LinearSimulator):
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""
         by_state, by_input = self.derivatives(h)
-        found = by_state @ self.state + by_input @ self.input
+        found = by_state @ self.state + by_input @ (self.input + self.added)
         self.output[:] = found[: len(self.output)]
         self.state[:] = found[len(self.output) :]
 

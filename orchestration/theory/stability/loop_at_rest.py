@@ -240,7 +240,7 @@ class AtRest:
         return Rest(
             fmu=fmu.fmu,
             inputs=inputs,
-            held=np.array([fmu.written[end] for end in inputs]),
+            held=np.array([fmu.written[end] if end in fmu.written else float(fmu.get(end)) for end in inputs]),
             outputs=tuple(output for output in read if fmu.model.variables[output].kind == "Real"),
             time=fmu.time,
         )

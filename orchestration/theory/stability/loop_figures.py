@@ -11,12 +11,13 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.unit_algebra import in_brackets
+from orchestration.foundation.basics.unit_algebra import in_brackets, quantity
 from orchestration.simulation.figures.lines import label_time, plain
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, RED, SHADES
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal, unit
 from orchestration.simulation.results.quantities import Quantity, setting
+from orchestration.theory.stability.closed_loop_step import StepResponse
 from orchestration.theory.stability.frequency import Bode, LoopMargins, critical_phase
 from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step_response import Step
@@ -155,6 +156,21 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
     axes.set(ylabel=in_brackets("taken back of a step of 1", shared), xlim=(0.0, end))
     label_time(axes)
     figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def response_figure(result: StepResponse, style: Style = SCREEN) -> Figure:
+    """What an output does after a step of an input; its final value is dotted."""
+    figure = style.figure(38.0)
+    axes = figure.add_subplot()
+    axes.plot(result.times, result.response, color=BLUE, drawstyle="steps-post" if result.is_held else "default")
+    axes.axhline(result.steady_state, color=GREY, linewidth=1.0, linestyle=":")
+    end = min(float(result.times[-1]), CALM * result.settling_time) or float(result.times[-1])
+    axes.set(
+        title=f"after a step of {quantity(1.0, unit(result.input_unit))} of {result.input}",
+        ylabel=in_brackets(signal(result.output, {}), unit(result.unit)), xlim=(0.0, end),
+    )  # fmt: skip
+    label_time(axes)
     return figure
 
 

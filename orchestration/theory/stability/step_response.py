@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 LEFT = 1e-4
 """Share of a step that is left when its response ends"""
-MAX_SAMPLES = 100_000
+MAX_SAMPLES = 1_000_000
 SETTLED = 0.02
 """Share of the final value within which a response is settled"""
 LOW, HIGH = 0.1, 0.9
@@ -138,9 +138,7 @@ def _taken_back(whole: ClosedLoop, each: Floats, state: Floats) -> Floats:
 def _responses(whole: ClosedLoop, each: Floats, radius: float) -> Floats:
     """What the law takes back at each sample, shape (commands, n), until nothing moves."""
     A, steps, samples = whole.A, whole.steps @ each, len(each) // each.shape[1]
-    count = MAX_SAMPLES if radius >= 1.0 else math.ceil(math.log(LEFT) / math.log(max(radius, LEFT))) + len(A) + 1
-    if count * samples >= MAX_SAMPLES:
-        raise UsageError(f"step: expected a response of at most {MAX_SAMPLES} samples; this loop needs more")
+    count = periods_until_left(radius, len(A), samples)
     state, found = np.zeros_like(steps), np.zeros((each.shape[1], count, samples))
     for k in range(count):
         found[:, k] = _taken_back(whole, each, state)
@@ -148,19 +146,43 @@ def _responses(whole: ClosedLoop, each: Floats, radius: float) -> Floats:
     return found.reshape(len(found), -1)
 
 
-def _figures(loop: Linearised, request: RequestLike, i: int, times: Floats, response: Floats, final: float) -> LoopStep:
-    output, system = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}", system_of(request_of(request))
+def periods_until_left(radius: float, states: int, samples: int) -> int:
+    """After how many periods, each of some samples, a response has ended; raises `UsageError` for too many."""
+    count = MAX_SAMPLES if radius >= 1.0 else math.ceil(math.log(LEFT) / math.log(max(radius, LEFT))) + states + 1
+    if count * samples >= MAX_SAMPLES:
+        raise UsageError(f"step: expected a response of at most {MAX_SAMPLES} samples; this loop needs more")
+    return count
+
+
+class StepSizes(NamedTuple):
+    """The sizes of a response, as of `LoopStep`."""
+
+    rise_time: float | None
+    overshoot: float | None
+    settling_time: float
+    steady_state: float
+
+
+def sizes_of(times: Floats, response: Floats, final: float, *, has_value: bool) -> StepSizes:
+    """The sizes of a response whose final value is not 0 if it `has_value`."""
     largest = float(np.abs(response).max(initial=0.0))
-    has_value = abs(final) > NO_VALUE * max(largest, 1.0)
     share = response / final if has_value else response
     outside = np.flatnonzero(np.abs(response - final) > SETTLED * (abs(final) if has_value else largest))
     low, high = (int((share >= level).argmax()) for level in (LOW, HIGH)) if has_value else (0, 0)
-    return LoopStep(
-        input=receivers_of(request, output),
-        output=output,
-        unit=column_infos(system, files_of(system).models_of(system), [output])[output].unit,
+    return StepSizes(
         rise_time=float(times[high] - times[low]) if has_value else None,
         overshoot=max(0.0, 100.0 * (float(share.max()) - 1.0)) if has_value else None,
         settling_time=float(times[min(outside[-1] + 1, len(times) - 1)]) if len(outside) else 0.0,
         steady_state=final if has_value else 0.0,
+    )
+
+
+def _figures(loop: Linearised, request: RequestLike, i: int, times: Floats, response: Floats, final: float) -> LoopStep:
+    output, system = f"{loop.name}.{loop.component.outputs[i].removesuffix('[0]')}", system_of(request_of(request))
+    has_value = abs(final) > NO_VALUE * max(float(np.abs(response).max(initial=0.0)), 1.0)
+    return LoopStep(
+        input=receivers_of(request, output),
+        output=output,
+        unit=column_infos(system, files_of(system).models_of(system), [output])[output].unit,
+        **sizes_of(times, response, final, has_value=has_value)._asdict(),
     )

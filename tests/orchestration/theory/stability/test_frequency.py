@@ -334,7 +334,7 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     of_floats = [dataclasses.replace(one, in_double=("a", "b")) for one in (step_of("dc_servo"), bode_of("dc_servo"))]
     assert all(one.verdict.endswith("tions, float code of a, b in double precision)") for one in of_floats)
     for name in ("bode", "step"):
-        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / f"{name}_controller.png").read_bytes().startswith(b"\x89PNG")
     (axes,) = step_of("dc_servo").plot()["step"].axes
     assert axes.get_ylabel() == "taken back of a step of 1 [V]"
     gain, phase, sensitivity, _ = bode_of("dc_servo").plot()["bode"].axes

@@ -52,7 +52,7 @@ def test_poles_are_those_of_python_control_and_leave_the_circle_at_the_delay_mar
     poles = np.sort_complex([complex(*pole) for pole in found["poles"][3]])
     assert poles == pytest.approx(np.sort_complex(closed.poles()), abs=1e-6)
     assert found["radius"][3] == pytest.approx(loop.radius, rel=1e-9)
-    assert (tmp_path / "locus.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "locus_connections_command_delay.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_values_without_poles_take_nothing_from_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
