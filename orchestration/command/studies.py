@@ -61,15 +61,16 @@ def sweep(
     return CommandResult(document=document, verdict=summary.verdict, lines=lines, good=not summary.failed)
 
 
-def status(study: StudyFile, out: Out = None) -> CommandResult:
+def status(study: StudyFile, out: Out = None, store: Annotated[Path | None, STORE] = None) -> CommandResult:
     """Show the progress of a study, also while it runs in another process."""
-    from orchestration.experiments.studies.store import note_on_engines, open_for_reading, store_path
+    from orchestration.experiments.studies.store import note_on_engines, open_for_reading, store_folder, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
     from orchestration.simulation.results.objectives import how_runs_ended
     from orchestration.simulation.workers.batching import LaneAgreement
 
     loaded = load_study(study)
+    out = store_folder(loaded.name, store, out) or out
     path = store_path(loaded.name, out)
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)

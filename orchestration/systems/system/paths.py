@@ -18,7 +18,7 @@ from orchestration.systems.system.component import (
     TaskSampling,
     with_own_period,
 )
-from orchestration.systems.system.computers import Arrivals, Computer, Network
+from orchestration.systems.system.computers import Arrivals, Computer, Network, Task
 from orchestration.systems.system.connection import Connection, Source, component_of, variable_of
 from orchestration.systems.system.distribution import parsed_fields
 from orchestration.systems.system.model import AFTER, System
@@ -220,6 +220,8 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         known = key in keys[:-1]
     if not known:
         listed = f"{table}.{name}. and one of {', '.join(keys)}"
+        if table == "components" and (task := _of_task(system.components[name], key)) is not None:
+            raise UsageError(f"{path}: {name} is a task, which its computer times: expected {task}")
         kind = {"components": Component, "connections": Connection}.get(table)
         if key in ("parameters", "sampling") and f"{key}." in listed:
             raise UsageError(
@@ -230,6 +232,14 @@ def _expect_key(path: str, table: str, system: System, name: str, key: str) -> N
         if key in of_files and key != "step":  # which none has beside sampling
             raise UsageError(f"{path}: {_IN_FILE_ONLY}; expected {listed}")
         raise UsageError(f"{path}: no such key; expected {listed}{did_you_mean(key, keys)}")
+
+
+def _of_task(component: Component, key: str) -> str | None:
+    """What a task of a computer has in place of a key of sampling, or step; None: it is none, or the key is another."""
+    if not isinstance(component.sampling, TaskSampling) or key.partition(".")[0] not in ("sampling", "step"):
+        return None
+    keys, asked = [f.name for f in dataclasses.fields(Task)], key.partition(".")[2]
+    return f"{component.sampling.task}." + (asked if asked in keys else f" and one of {', '.join(keys)}")
 
 
 def _keys_of_stepping(component: Component) -> list[str]:

@@ -137,7 +137,7 @@ def test_a_log_that_cannot_be_written_is_one_line(main: Main, here: Path) -> Non
         (["run", "--preset", "px44"], "px4"),
         (["run", "--engine", "pyton"], "python"),
         (["limit", "--of", "dealy"], "delay"),
-        (["status", "study.toml", "--store", "x"], "--out"),
+        (["status", "study.toml", "--stor", "x"], "--store"),
     ],
 )
 def test_of_what_is_mistyped_the_closest_is_named(arguments: list[str], meant: str, main: Main) -> None:

@@ -62,7 +62,9 @@ def test_a_study_is_run_inspected_and_exported(flown: Path, swept: tuple[Path, D
     told = [line for line in swept[1].stderr.splitlines() if " of 6 runs" not in line]  # or how far, if slow
     assert told.pop(0).startswith("engine compiled: slow, as QuadrotorPlant, UnifiedController run Python; ")
     assert told == ["follows the trajectory that UnifiedController has built in"]
-    assert main("status", "study.toml").stdout == f"{answer}\n{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
+    for where in ((), ("--store", STORE.parent), ("--store", STORE), ("--out", STORE.parent)):
+        shown = main("status", "study.toml", *where).stdout
+        assert shown == f"{answer}\n{STORE}: 6 of 6 runs, 0 failed, 0 missing\n"
     exported = main("export", "study.toml").stdout.splitlines()
     assert exported == [str(STORE.parent / "runs.parquet"), str(STORE.parent / "runs.csv")]
     parquet = pd.read_parquet(flown / exported[0])

@@ -79,6 +79,18 @@ def test_every_key_has_a_path(file, path, value):
     assert run_key(changed(new, {path: value_at(system, path)}), files) == run_key(system, files)
 
 
+def test_the_time_of_a_task_is_a_key_of_its_computer(file):
+    """Of one that has a component: its sampling is no table of the file."""
+    system = load_system(file)
+    for key, meant in (("sampling.jitter", "jitter"), ("step", " and one of component, period, offset, jitter, arri")):
+        with pytest.raises(UsageError) as error:
+            changed(system, {f"components.controller.{key}": 0.01})
+        told = (
+            f"components.controller.{key}: controller is a task, which its computer times: expected {CONTROL}.{meant}"
+        )
+        assert str(error.value).startswith(told)
+
+
 def test_a_trace_that_is_written_anew_has_another_schedule(file):
     system = load_system(file)
     before = schedule_key(system)

@@ -98,9 +98,7 @@ def test_what_has_no_response_is_refused_in_words() -> None:
     with pytest.raises(UsageError, match=r"plant\.w: no Real output; did you mean plant\.x"):
         step_response(integrator, to="noise", of="plant.w")
     unstable = changed(integrator, {"components.controller.parameters.gain": 2.1})
-    with pytest.raises(
-        UsageError, match=r"a loop that settles; from noise to plant\.x the spectral radius is"
-    ):
+    with pytest.raises(UsageError, match=r"a loop that settles; from noise to plant\.x the spectral radius is"):
         step_response(unstable, to="noise", of="plant.x")
 
 
