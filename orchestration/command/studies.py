@@ -125,7 +125,7 @@ def export(
     if what.is_dir():
         return result_of_files(of_study(store_path("", what), formats or (), out=out))
     study = load_study(what)
-    path = _current_store(what, store_folder(study.name, store, out))
+    path = _current_store(what, store_folder(study.name, store, out), mean=mean)
     if table is None:
         return result_of_files(of_study(path, formats or (), study, metric, out=out, mean=mean))
     from orchestration.command.study_table import study_table
@@ -161,7 +161,7 @@ def draw(
         loaded = load_study(study)
         expect_metric(loaded, metric)
         store = store_folder(loaded.name, store, out)
-        _current_store(study, store)
+        _current_store(study, store, mean=mean)
         style = look.figure_style
         return result_of_files(draw_study(loaded, store, metric, style, progress, out=out, at=at or (), mean=mean))
 
@@ -171,8 +171,12 @@ def _sweep_command(study: Path, out: Path | None) -> str:
     return f"quadcosim sweep {study}" + ("" if out is None else f" --out {out}")
 
 
-def _current_store(study: Path, out: Path | None) -> Path:
-    """The store of a study file that has not changed since its runs; warns if some are missing."""
+def _current_store(study: Path, out: Path | None, *, mean: bool) -> Path:
+    """The store of a study file that has not changed since its runs; warns if some are missing.
+
+    Of a `mean` it warns, too, if it was not examined which means of squares are finite, as a sweep does at its end.
+    """
+    from orchestration.experiments.studies.infinite_means import INFINITE
     from orchestration.experiments.studies.store import open_for_reading, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import expect_current
@@ -182,9 +186,11 @@ def _current_store(study: Path, out: Path | None) -> Path:
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
         there, total = sum(opened.counts().values()), len(loaded.points)
-        outcomes = opened.outcomes()
+        outcomes, examined = opened.outcomes(), opened.about().get(INFINITE) != ""
     if there < total:
         warn(f"{path}: {there} of {total} runs; the others are missing, {_sweep_command(study, out)} runs them")
+    elif mean and not examined:
+        warn(f"{path}: which means of squares are finite is not yet examined; {_sweep_command(study, out)} does")
     _tell_if_undecided(loaded, outcomes)
     return path
 

@@ -102,11 +102,8 @@ def sweep(
     columns, execution, follows = prepare(study, engine)
     study, files = columns.study, columns.files
     path = store.store_path(study.name, out)
-    with (
-        runs_reporter(progress) as report,
-        store.open_for_writing(path, study.metric_names) as opened,
-        contextlib.ExitStack() as stack,
-    ):
+    with store.open_for_writing(path, study.metric_names) as opened, contextlib.ExitStack() as stack:
+        report = stack.enter_context(runs_reporter(progress))
         _expect_same_study(opened, columns)
         if engine == "auto":
             before = opened.about().get(ENGINE, execution.name)
@@ -115,9 +112,6 @@ def sweep(
         reached = None if dask is None else stack.enter_context(cluster(Inputs.of(all_files), dask))
         _describe(opened, columns)  # last, so that what is refused changes nothing
         missing = _missing(opened, study, retry_failed)
-        infinite = _infinite_means(opened, columns)
-        if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
-            warn(warning)
         sweep_progress = _Progress(study, missing, report, announce)
         sample, agreement = _not_known_to_agree(opened) if execution.in_lanes else Sample(), None
         if len(missing) or sample.runs:
@@ -151,6 +145,10 @@ def sweep(
         if agreement is not None:
             opened.describe({AGREEMENT: agreement.as_text()})
             agreement.expect()
+        stack.close()  # nothing more runs
+        infinite = _infinite_means(opened, columns)
+        if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
+            warn(warning)
         failed, engines = opened.counts().get("failed", 0), opened.engines()
     return Swept(
         study=study, total=len(study.points), flown=len(missing), failed=failed, path=path, engine=execution.name,
@@ -321,11 +319,17 @@ def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:
 
 
 def _infinite_means(opened: store.Store, columns: RunColumns) -> InfiniteMeans:
-    """The points without a finite expectation, examined once for each design of a store."""
-    known = opened.about()[INFINITE]
-    found = InfiniteMeans.from_text(known) if known else InfiniteMeans.of(columns.study, columns.files)
-    if not known:
-        opened.describe({INFINITE: found.as_text()})
+    """The points without a finite expectation, examined once for each design of a store.
+
+    They are examined after the runs, which an interruption then leaves complete; the next sweep examines them.
+    """
+    if known := opened.about()[INFINITE]:
+        return InfiniteMeans.from_text(known)
+    try:
+        found = InfiniteMeans.of(columns.study, columns.files)
+    except KeyboardInterrupt:
+        raise Interrupted("with all runs done, but means of squares not yet examined") from None
+    opened.describe({INFINITE: found.as_text()})
     return found
 
 

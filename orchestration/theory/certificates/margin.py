@@ -17,6 +17,7 @@ from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseco
 from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.systems.system.connection import variable_of
 from orchestration.systems.system.distribution import highest, lowest
 from orchestration.systems.system.files import files_of
@@ -170,9 +171,10 @@ def highest_at(system: System, path: str) -> float:
 
 def linear_loop_of(request: Request) -> CertifiedLoop:
     """The loop of a request about its operating point, from its FMUs, without computers and networks."""
-    files = files_of(system := system_of(request))
+    loaded, _ = single_run_execution(request, "auto")
+    files = files_of(system := system_of(loaded))
     with warned_of_timing(system, files):
-        return isolated_call(files.fmus.values(), _linear_loop_of, request)
+        return isolated_call(files.fmus.values(), _linear_loop_of, loaded)
 
 
 def _linear_loop_of(request: Request) -> CertifiedLoop:

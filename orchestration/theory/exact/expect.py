@@ -10,6 +10,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.simulation.workers.choice import single_run_execution
 from orchestration.systems.expressions.syntax import Call
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
@@ -79,6 +80,7 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
     request = request_of(request)
     if horizon is not None and request.kind in LOOPS:
         raise UsageError("horizon: expected a system file, which has an initial state")
+    request, _ = single_run_execution(request, "auto")
     with errors_in_own_terms(request):
         system = rested(request)
         files = files_of(system)

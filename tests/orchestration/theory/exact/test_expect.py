@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import re
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from orchestration.command.exact import warn_if_means_are_infinite
 from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.foundation.basics.bisection import Range
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
@@ -24,6 +26,7 @@ from orchestration.systems.system.connection import Source
 from orchestration.systems.system.file import system_from_tables
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion, System
+from orchestration.theory.certificates.margin import linear_loop_of
 from orchestration.theory.exact import flown, mean_square, moments
 from orchestration.theory.exact.as_simulated import expect_rows
 from orchestration.theory.exact.expect import Expected, expect, expected_of
@@ -35,7 +38,7 @@ from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.identification import in_continuous_time
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.matrices import SampledSystem
-from quadcosim import UsageError, limit
+from quadcosim import UsageError, limit, load_system
 from tests.commands import Main
 from tests.examples.common import native_example as example
 from tests.extent import in_test_all
@@ -256,6 +259,22 @@ def test_where_noise_alone_is_random_the_mean_square_limit_is_the_local_one() ->
     assert below < 1.0 < above
 
 
+@needs_compiler
+@pytest.mark.parametrize("loop_of", [expect, linear_loop_of], ids=["expect", "margin"])
+def test_native_twins_are_linearised_if_available(
+    loop_of: Callable[[System], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded = list[Path]()
+    monkeypatch.setattr(f"{loop_of.__module__}.isolated_call", lambda fmus, *_: loaded.extend(fmus))
+    system = load_system(EXAMPLES / "minimum_variance/system.toml")
+    loop_of(system)
+    of_run = list[str]()
+    monkeypatch.setattr(mean_square, "isolated_call", lambda fmus, *_: [*map(of_run.append, fmus)])
+    warn_if_means_are_infinite(system)
+    assert {path.parent.name for path in loaded} == {"native"}
+    assert of_run == loaded
+
+
 NO_END = "variance, effort: without a finite expectation"
 
 
@@ -266,7 +285,9 @@ def test_a_run_says_that_its_averages_mean_nothing(main: Main) -> None:
     assert NO_END not in main("run", path, "--set", "stop_time=20", "--set", f"{loss}=0.2").stderr
 
 
-def test_a_sweep_names_the_points_and_their_means_have_no_interval(main: Main, tmp_path: Path) -> None:
+def test_a_sweep_names_the_points_after_its_runs_and_their_means_have_no_interval(
+    main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     study, store = tmp_path / "study.toml", tmp_path / "store"
     study.write_text(
         f"""
@@ -288,8 +309,23 @@ repeat = "seed"
 """
     )
     told = f"{NO_END} at 1 of 3 points (loss 0.3, length 5 s), so an average over runs means nothing"
-    assert told in main("sweep", study, "--out", store).stderr
-    printed = main("export", study, "--store", store, "--metric", "variance", "--mean", "--table", "markdown").stdout
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    table = ("export", study, "--store", store, "--metric", "variance", "--mean", "--table", "markdown")
+    with monkeypatch.context() as at_once:
+        at_once.setattr(InfiniteMeans, "of", stop)
+        stopped = main("sweep", study, "--out", store, code=130).stderr
+        assert stopped.endswith("interrupted with all runs done, but means of squares not yet examined\n")
+    unknown = "which means of squares are finite is not yet examined"
+    assert unknown in main(*table).stderr
+    done = main("sweep", study, "--out", store)
+    assert told in done.stderr
+    assert done.stdout.splitlines()[1].endswith("6 runs, 0 of them new")
+    table_with_them = main(*table)
+    printed = table_with_them.stdout
+    assert unknown not in table_with_them.stderr
     assert [line.count("no finite expectation") for line in printed.splitlines()[2:5]] == [0, 0, 1]
     found = InfiniteMeans.in_store(store / "study.sqlite")
     assert found is not None
