@@ -46,7 +46,7 @@ class LabelledAxisTable(AxisTable):
     """`[[axes]]` of a study, whose values may have labels, or be designs: lists."""
 
     values: list[Value | dict[str, Any] | list[Value | dict[str, Any]]] | None = None  # type: ignore[assignment]
-    """The values; a table is a distribution, a list a design: a value for each path of `sets`."""
+    """The values; a table is a distribution, a list a design: a value for each path of `sets`, `{}` for none."""
     labels: list[str] | None = None
     """The names of its values, in their order, which tables, figures and `--at` have in place of these."""
 
@@ -206,7 +206,11 @@ Settings: TypeAlias = Sequence[Mapping[str, Value]]
 def _settings(table: LabelledAxisTable, axis: Axis) -> Settings:
     """What the values of an axis set."""
     if _has_designs(table):
-        return [dict(zip(axis.targets, _values(given))) for given in table.values or () if isinstance(given, list)]
+        designs = [given for given in table.values or () if isinstance(given, list)]
+        return [
+            {path: value for path, value, item in zip(axis.targets, _values(given), given) if item != {}}
+            for given in designs
+        ]
     return [dict.fromkeys(axis.targets, value) for value in axis.values or ()]
 
 

@@ -344,6 +344,13 @@ def test_a_design_has_a_value_for_each_path(tmp_path: Path, rest: str, said: str
     assert said in refused(tmp_path, f"{DESIGNS}{rest}\n")
 
 
+def test_a_design_sets_no_path_for_which_it_has_an_empty_table(tmp_path: Path) -> None:
+    base = "[base]\nseed = 5\nstop_time = 7.0\n"
+    designs = load(tmp_path, f'{base}{DESIGNS}[[1, {{}}], [{{}}, 4.0]]\nlabels = ["a", "b"]\n')
+    systems = [designs.system(i, {}) for i in (0, 1)]
+    assert [(system.seed, system.stop_time) for system in systems] == [(1, 7.0), (5, 4.0)]
+
+
 LAWS = '[[axes]]\nname = "law"\nsets = ["controller"]\nvalues = ["UnifiedController", "CascadedController"]\n'
 
 
