@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from orchestration.foundation.basics.bisection import Range
+from orchestration.foundation.basics.bisection import Bracket, Range
 from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
@@ -21,7 +21,7 @@ from orchestration.theory.stability.loop_figures import _rows_of
 from orchestration.theory.stability.operating_point import hyperperiod_of
 from orchestration.theory.stability.poles import poles_of
 from orchestration.theory.stability.root_locus import Crossing, RootLocus
-from orchestration.theory.stability.several_rates import commensurate
+from orchestration.theory.stability.several_rates import commensurate, narrowed
 from orchestration.theory.stability.sign_changes import uncertainty
 from quadcosim import Timing, UsageError, bode, linearise, locus
 from tests.commands import Main
@@ -138,8 +138,8 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
 def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None:
     """That of the simplest ratio within half a step, where there is one; else the nearest, as 12 / 25 of 2 ms."""
 
-    def two(period: float) -> System:
-        each = {"law": period, "servo": 0.002}
+    def two(period: float, other: float = 0.002) -> System:
+        each = {"law": period, "servo": other}
         samplings = {name: Component(fmu=f"{name}.fmu", sampling=Sampling(period=x)) for name, x in each.items()}
         return System(stop_time=9.0, components=samplings)
 
@@ -152,6 +152,10 @@ def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None
     assert rates.meetings.between(0.00094, 0.00099) == [0.00095, 0.00096]
     assert rates.meetings.between(0.0041, 0.0044) == [0.0041, 0.004125, 0.0042, 0.00425, 0.0043, 0.004375, 0.0044]
     assert all(hyperperiod_of(two(value)) is not None for value in rates.meetings.between(0.0002, 0.03))
+    alone = commensurate(lambda value: two(value, 0.0002), [0.007, 0.0075], instead=True)
+    assert alone is not None
+    passed_by = narrowed(lambda value: value == 0.0072 or value >= 0.00722, Bracket(0.007, 0.0075), alone)
+    assert passed_by == (0.00719, 0.0072)
 
 
 def test_a_locus_of_one_value_is_refused() -> None:
