@@ -52,7 +52,7 @@ SETTLED = 6
 INSTANTS = 1001
 """instants at which it is seen whether a source changes meanwhile"""
 HELD = 2
-"""messages that a first-order hold remembers"""
+"""messages that a first-order hold remembers, each of a longest period at most"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -407,7 +407,7 @@ def begin_of(calm: System, period: Fraction) -> Fraction:
     It is a sample of the component that begins last.
     """
     delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
-    return latest_offset(calm) + (math.ceil(delay / period) + HELD) * period
+    return latest_offset(calm) + math.ceil((delay + HELD * longest_period(calm)) / period) * period
 
 
 def written_in(simulation: PreparedRun) -> dict[str, dict[str, float]]:
