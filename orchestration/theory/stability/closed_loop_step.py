@@ -170,7 +170,8 @@ def _inputs(system: System, models: Mapping[str, Model], to: str) -> tuple[str, 
     reals = set(_reals(models, "input"))
     sources = {name: one for name, one in system.sources.items() if one.to and reals.issuperset(one.to)}
     named = {name: one.to for name, one in sources.items() if one.constant is not None or len(one.to) == 1}
-    named |= {each: (end,) for name, one in sources.items() for each, end in zip(one.signals(name), one.to)}
+    several = {name: one for name, one in sources.items() if len(one.to) > 1}
+    named |= {each: (end,) for name, one in several.items() for each, end in zip(one.signals(name), one.to)}
     named |= {end: (end,) for end in _reals(models, "input")}
     if to not in named:
         raise _unknown(f"{to}: no source and no Real input", to, [*named])
