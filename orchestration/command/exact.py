@@ -1,6 +1,5 @@
 """The command `expect`, which needs no run."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from orchestration.command.flags import AsSimulated, FlightFlags, ScenarioFile, Timing, flight_options, request_from
@@ -32,16 +31,12 @@ def expect(
 
 
 def warn_if_means_are_infinite(request: "Request") -> None:
-    """Warn if averages over runs have no finite expectation; by native twins where they are: none is built for it."""
-    from orchestration.components.building.fmus import native_twin
-    from orchestration.simulation.workers.choice import single_run_execution
+    """Warn if averages over runs have no finite expectation."""
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
     from orchestration.theory.exact.mean_square import averages_of, infinite_means, mean_squares
 
     system = system_of(request)
-    if all(Path(native_twin(component.fmu)).is_file() for component in system.components.values()):
-        system = system_of(single_run_execution(request, "auto")[0])
     (radius,) = mean_squares(request, [system], files_of(system)).radii
     if radius is not None and radius >= 1.0:
         warn(infinite_means(averages_of(system), "", radius))

@@ -3,7 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+from orchestration.components.building.fmus import locate, native_twin, native_twins
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, ends_of_good
@@ -99,12 +101,21 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
     keys = [key for key in chosen if linear[key] in first]
     radii: list[float | None] = [None] * len(systems)
     with suppress(QuadcosimError):
-        examined = [chosen[key] for key in keys]
+        examined, files = _with_twins([chosen[key] for key in keys], files)
         found = isolated_call(files.fmus.values(), radii_of, examined, files.models) if keys else []
         for key, radius in zip(keys, found):
             for place in places[key]:
                 radii[place] = radius
     return MeanSquares(radii=radii, left_out=sum(len(places[key]) for key in chosen.keys() - {*keys}))
+
+
+def _with_twins(systems: Sequence[System], files: Files) -> tuple[Sequence[System], Files]:
+    """Systems and their files with native twins, if all are there: none is built for a warning."""
+    twins = [native_twin(fmu) for fmu in files.fmus]
+    if all(Path(twin).is_file() for twin in twins):
+        with suppress(QuadcosimError):  # one is out of date, and cannot be built
+            return [native_twins(system) for system in systems], replace(files, fmus={x: locate(x) for x in twins})
+    return systems, files
 
 
 def _linearised_as(system: System) -> str:
