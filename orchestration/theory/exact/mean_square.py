@@ -1,5 +1,6 @@
 """Infinite mean squares: the value of a random quantity from which on they are, and a warning for such runs."""
 
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, prefixed
-from orchestration.foundation.basics.terminal import progress_bar
+from orchestration.foundation.basics.terminal import inform, progress_bar
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
@@ -64,6 +65,8 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
 
 SURE_TOLERANCE = 1e-3
 """Difference of a radius allowed from order to order: enough to know whether it is above 1"""
+LONG = 10.0
+"""Time from which on a remark says what would be faster [s]"""
 MAX_LINEARISED = 50
 """systems that are linearised: others are examined that differ from them in random times alone"""
 
@@ -102,7 +105,10 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
     radii: list[float | None] = [None] * len(systems)
     with suppress(QuadcosimError):
         examined, files = _with_twins([chosen[key] for key in keys], files)
+        began = time.monotonic()
         found = isolated_call(files.fmus.values(), radii_of, examined, files.models) if keys else []
+        if (took := time.monotonic() - began) > LONG and any(native_twin(fmu) != fmu for fmu in files.fmus):
+            inform(f"means of squares took {took:.0f} s by FMUs in Python; quadcosim build --native makes fast ones")
         for key, radius in zip(keys, found):
             for place in places[key]:
                 radii[place] = radius

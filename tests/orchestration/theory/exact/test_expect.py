@@ -277,6 +277,18 @@ def test_native_twins_are_linearised_if_available(
     assert of_means == [*loaded, *loaded]
 
 
+def test_means_of_squares_say_what_would_be_faster_if_they_take_long(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(mean_square, "isolated_call", lambda *_: [None])
+    monkeypatch.setattr(mean_square, "_with_twins", lambda *as_they_are: as_they_are)
+    system = load_system(EXAMPLES / "minimum_variance/system.toml")
+    for long, remarks in ((math.inf, 0), (-1.0, 1)):
+        monkeypatch.setattr(mean_square, "LONG", long)
+        warn_if_means_are_infinite(system)
+        assert capsys.readouterr().err.count("by FMUs in Python; quadcosim build --native makes") == remarks
+
+
 NO_END = "variance, effort: without a finite expectation"
 
 
