@@ -34,12 +34,12 @@ def warn_if_means_are_infinite(request: "Request") -> None:
     """Warn if averages over runs have no finite expectation."""
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
-    from orchestration.theory.exact.mean_square import averages_of, infinite_means, mean_squares
+    from orchestration.theory.exact.mean_square import infinite_means_in_words, mean_squares, objectives_of_means
 
     system = system_of(request)
     (radius,) = mean_squares(request, [system], files_of(system)).radii
     if radius is not None and radius >= 1.0:
-        warn(infinite_means(averages_of(system), "", radius))
+        warn(infinite_means_in_words(objectives_of_means(system), "", radius))
 
 
 def _lines(expected: "Expected") -> list[str]:

@@ -36,11 +36,12 @@ def bode(
 
     A negative phase margin belongs to a stable loop, too: one that a lead of the phase, and no lag, makes unstable.
     """
+    from orchestration.systems.system.connection import component_of
     from orchestration.theory.stability.frequency import bode as response_of
 
     found = response_of(request_from(scenario, flags, timing), component)
     if out is not None:
-        _draw(found.plot(), out, _owner(found.outputs[0]))
+        _draw(found.plot(), out, component_of(found.outputs[0]))
     rows = [("loop", "gain margin", "phase margin", "delay margin", "crossover", "peak of sensitivity")]
     for loop in found.loops:
         phase, delay, crossover = loop.phase_margin, loop.delay_margin, loop.crossover
@@ -90,6 +91,7 @@ def step(
 
     Without --to and --of: how each command's loop takes back a step that is added to the command.
     """
+    from orchestration.systems.system.connection import component_of
     from orchestration.theory.stability.step_response import step as response_of
 
     if to is not None or of is not None:
@@ -98,7 +100,7 @@ def step(
         return _closed_loop_step(request_from(scenario, flags, timing), to, of, out)
     found = response_of(request_from(scenario, flags, timing), component)
     if out is not None:
-        _draw(found.plot(), out, _owner(found.loops[0].output))
+        _draw(found.plot(), out, component_of(found.loops[0].output))
     rows = [("loop", "rise time", "overshoot", "settling time", "final value")]
     for loop in found.loops:
         rise = "-" if loop.rise_time is None else quantity(loop.rise_time, "s")
@@ -172,12 +174,6 @@ def locus(
     }  # fmt: skip
     lines = list(in_columns(rows, right=True)) if found.crossings else []
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
-
-
-def _owner(output: str) -> str:
-    from orchestration.systems.system.connection import component_of
-
-    return component_of(output)
 
 
 def _draw(figures: "Figures", out: Path, of: str) -> None:

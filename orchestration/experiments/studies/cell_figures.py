@@ -54,7 +54,7 @@ ROW = 0.05
 BESIDE = 4.5
 """Distance [pt] of a number, and of a sign with one, from the middle of a cell with a dot"""
 _NO_VALUE, _SOME = "no value", "some runs left out"
-INFINITE: Any = {"marker": r"$\infty$", "markersize": 7.0, "markeredgewidth": 0.0}
+INFINITY: Any = {"marker": r"$\infty$", "markersize": 7.0, "markeredgewidth": 0.0}
 """Mark of a mean without a finite expectation"""
 HOLLOW: Any = {"markersize": 3.5, "markerfacecolor": "white", "zorder": 3}
 OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{}  •  −"
@@ -121,8 +121,8 @@ def cell_lines(
         panel.set_ylim(-0.02, 1.02)
     taken = _write_rows(panel, numbers) if numbered else 0.0
     if without:
-        mark_edge(panel, without, beside=taken, **INFINITE)
-        panel.plot([], [], linestyle="", **INFINITE, color=BLACK if laws else BLUE, label=NO_EXPECTATION)
+        mark_edge(panel, without, beside=taken, **INFINITY)
+        panel.plot([], [], linestyle="", **INFINITY, color=BLACK if laws else BLUE, label=NO_EXPECTATION)
     if lacking:
         mark_edge(panel, lacking, marker="x", low=True)
         panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
@@ -200,14 +200,13 @@ def cell_maps(
     for panel in panels[count:]:
         panel.set_visible(False)
     grids = [{name: _grid(group, axes, name) for name in ("value", "share", "without")} for _, group in groups]
-    everything = np.stack([grid["value"] for grid in grids])
+    everything = np.array([0.0, 1.0]) if metric == GOOD else np.stack([grid["value"] for grid in grids])
     letters = letters_of(style, columns)
     room, most = letters / (len(places[0]) - 1), found["count"].max()
     has_room = {form: len(form.format(most, most)) + 1 <= room for form in (OF_ALL, ALONE, MARKED)}
     writes, repeats = has_room[ALONE], most > 1
     for panel, (law, group), grid in zip(panels, groups, grids):
-        how = {"norm": Normalize(0.0, 1.0), "vmin": None} if metric == GOOD else {"of": everything}
-        filled = mesh.fill(panel, *places, grid["value"], **how)
+        filled = mesh.fill(panel, *places, grid["value"], of=everything)
         mesh.hatch(panel, *places, np.isnan(grid["share"]))
         mesh.hatch(panel, *places, grid["without"] > 0.0, mesh.NO_MEAN)
         _limit(panel, places, grid["share"])
@@ -224,12 +223,9 @@ def cell_maps(
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
     numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
     title = _title(metric, words, units, average, numbered=numbered, repeats=repeats)
-    title += (
-        f",\n{found['without'].sum()} cells without a finite expectation left out" if found["without"].any() else ""
-    )
-    if np.isfinite(everything).any():
-        range_of = np.array([0.0, 1.0]) if metric == GOOD else everything
-        mesh.color_bar(panels[: len(groups)].tolist(), filled, range_of, title, location="bottom", aspect=40.0)
+    if found["without"].any():
+        title += f",\n{found['without'].sum()} cells without a finite expectation left out"
+    mesh.color_bar(panels[: len(groups)].tolist(), filled, everything, title, location="bottom", aspect=40.0)
     if both is not None:
         of_pairs, of = differences_in(table, names, both, metric, average), "difference of the shares"
         if metric != GOOD:

@@ -10,7 +10,7 @@ from orchestration.experiments.studies.axes import Value, place_of
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.study import Study
 from orchestration.systems.system.files import Files
-from orchestration.theory.exact.mean_square import averages_of, infinite_means, mean_squares
+from orchestration.theory.exact.mean_square import infinite_means_in_words, mean_squares, objectives_of_means
 from orchestration.theory.stability.known_loops import LOOPS
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class InfiniteMeans:
     def of(cls, study: Study, files: Files) -> "InfiniteMeans":
         """Examine the points of a study; those are left out that are not linear about a rest."""
         axes = tuple(axis.name for axis in study.axes if axis.targets != ("seed",))
-        metrics = tuple(averages_of(study.origin))
+        metrics = tuple(objectives_of_means(study.origin))
         firsts = dict[tuple[Value, ...], int]()
         if metrics and study.base.kind not in LOOPS:
             for index in range(min(len(study.points), MAX_RUNS)):
@@ -86,7 +86,7 @@ class InfiniteMeans:
         more = [f"{len(self.points) - NAMED} more"] if len(self.points) > NAMED else []
         where = f" at {len(self.points)} of {self.total} points ({'; '.join([*named, *more])})" if self.axes else ""
         where += f", of which {self.left_out} were too many to be examined" if self.left_out else ""
-        return infinite_means(self.metrics, where, self.radius)
+        return infinite_means_in_words(self.metrics, where, self.radius)
 
     def column(self, table: "pd.DataFrame") -> "pd.Series[Any]":
         """The metrics of each run of a table without a finite expectation, in a tuple."""

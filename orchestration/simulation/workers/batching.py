@@ -9,6 +9,7 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.unit_algebra import counted
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import outline
 from orchestration.simulation.engines.master import BATCH
@@ -116,8 +117,7 @@ class LaneAgreement:
     """the same for the beginning of non-chaotic runs with FMUs in Python; None: there are no such FMUs"""
 
     def __str__(self) -> str:
-        runs = f"{self.runs} run" + "s" * (self.runs != 1)
-        text = f"{runs} repeated with FMUs: largest relative difference {self._largest}"
+        text = f"{counted(self.runs, 'run')} repeated with FMUs: largest relative difference {self._largest}"
         if self.python is None:
             return text
         return f"{text}; the beginning of {self.python.runs} with FMUs in Python: {self.python._largest}"

@@ -95,7 +95,7 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
     places: dict[str, list[int]] = {}
     chosen: dict[str, System] = {}
     for place, system in enumerate(systems) if request.kind not in LOOPS else ():
-        if system.depends_on_seed and averages_of(system):
+        if system.depends_on_seed and objectives_of_means(system):
             once = replace(system, seed=0)
             chosen.setdefault(key := once.to_toml(), once)
             places.setdefault(key, []).append(place)
@@ -132,7 +132,7 @@ def _linearised_as(system: System) -> str:
         return ""
 
 
-def infinite_means(metrics: Iterable[str], where: str, radius: float) -> str:
+def infinite_means_in_words(metrics: Iterable[str], where: str, radius: float) -> str:
     """A warning about averages of these objectives over runs, in one line; `where` as " at 1 of 2 points"."""
     return (
         f"{', '.join(metrics)}: without a finite expectation{where}, so an average over runs means nothing; "
@@ -140,7 +140,7 @@ def infinite_means(metrics: Iterable[str], where: str, radius: float) -> str:
     )
 
 
-def averages_of(system: System) -> list[str]:
+def objectives_of_means(system: System) -> list[str]:
     """The objectives that consist of means."""
     found = []
     for name, node in inlined_objectives(system.objectives).items():

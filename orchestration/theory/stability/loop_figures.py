@@ -152,9 +152,8 @@ def step_figure(result: Step, style: Style = SCREEN) -> Figure:
             label=in_brackets(signal(loop.output, {}), None if shared else unit(loop.unit)),
         )  # fmt: skip
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle=":")
-    end = min(float(result.times[-1]), CALM * result.slowest.settling_time) or float(result.times[-1])
-    axes.set(ylabel=in_brackets("taken back of a step of 1", shared), xlim=(0.0, end))
-    label_time(axes)
+    axes.set_ylabel(in_brackets("taken back of a step of 1", shared))
+    _limit_time(axes, result.times, result.slowest.settling_time)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
@@ -165,13 +164,15 @@ def response_figure(result: StepResponse, style: Style = SCREEN) -> Figure:
     axes = figure.add_subplot()
     axes.plot(result.times, result.response, color=BLUE, drawstyle="steps-post" if result.is_held else "default")
     axes.axhline(result.steady_state, color=GREY, linewidth=1.0, linestyle=":")
-    end = min(float(result.times[-1]), CALM * result.settling_time) or float(result.times[-1])
-    axes.set(
-        title=f"after a step of {quantity(1.0, unit(result.input_unit))} of {result.input}",
-        ylabel=in_brackets(signal(result.output, {}), unit(result.unit)), xlim=(0.0, end),
-    )  # fmt: skip
-    label_time(axes)
+    axes.set_title(f"after a step of {quantity(1.0, unit(result.input_unit))} of {result.input}")
+    axes.set_ylabel(in_brackets(signal(result.output, {}), unit(result.unit)))
+    _limit_time(axes, result.times, result.settling_time)
     return figure
+
+
+def _limit_time(axes: Axes, times: Floats, settling_time: float) -> None:
+    axes.set_xlim(0.0, min(times[-1], CALM * settling_time) or times[-1])
+    label_time(axes)
 
 
 def locus_figure(result: RootLocus, style: Style = SCREEN) -> Figure:

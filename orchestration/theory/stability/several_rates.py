@@ -108,8 +108,8 @@ def commensurate(
 
     if instead:
         given = repeating(values)
-        others_of = {meetings.instead(values, k) for k, one in enumerate(values) if one not in given}
-        known = repeating({*given, *filter(math.isfinite, others_of)})
+        instead_of = {meetings.instead(values, k) for k, one in enumerate(values) if one not in given}
+        known = repeating({*given, *filter(math.isfinite, instead_of)})
         moved = len(values) - len(given)
     else:
         added = sorted({value for period in others for value in multiples(period)})
