@@ -93,12 +93,10 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
     own loop: those are not linear where they run.
     """
     places: dict[str, list[int]] = {}
-    chosen: dict[str, System] = {}
     for place, system in enumerate(systems) if request.kind not in LOOPS else ():
         if system.depends_on_seed and objectives_of_means(system):
-            once = replace(system, seed=0)
-            chosen.setdefault(key := once.to_toml(), once)
-            places.setdefault(key, []).append(place)
+            places.setdefault(replace(system, seed=0).to_toml(), []).append(place)
+    chosen = {key: replace(systems[alike[0]], seed=0) for key, alike in places.items()}
     linear = {key: _linearised_as(system) for key, system in chosen.items()}
     first = {*list(dict.fromkeys(linear.values()))[:MAX_LINEARISED]}
     keys = [key for key in chosen if linear[key] in first]

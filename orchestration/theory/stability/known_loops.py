@@ -32,6 +32,7 @@ class LinearLimit:
     method: str | None = None
     accuracy: float | None = None
     reason: str = ""
+    """Why there is none; beside one, what else is to be said of it"""
 
 
 @dataclass(frozen=True, kw_only=True)

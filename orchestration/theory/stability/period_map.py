@@ -47,8 +47,7 @@ def period_map(
     By the state before, at the begin of a period, and to the right by the values the ports send. Other `connections`
     than those of the loop at rest may carry the signals, as later ones.
     """
-    ports = ports or {}
-    ports = {name: port.abreast(ABREAST) for name, port in ports.items()}
+    ports = {name: port.abreast(ABREAST) for name, port in (ports or {}).items()}
     simulators = {**{name: one.abreast(ABREAST) for name, one in loop.tangents.items()}, **ports}
     system = loop.simulation.system
     if connections is not None:
@@ -194,8 +193,8 @@ def _begun(
     )
     streams, models = Streams(system.seed, system.streams), {n: i.model for n, i in simulation.instances.items()}
     timetable = Timetable(system, streams, fixed_steps(system, models))
-    all_recorded = dict[str, Sequence[str]](dict.fromkeys(simulators, ())) | dict(recorded or {})
-    running = RunningSystem(system, simulators, timetable=timetable, streams=streams, recorded=all_recorded, runs=runs)
+    recorded = {**dict.fromkeys(simulators, ()), **(recorded or {})}
+    running = RunningSystem(system, simulators, timetable=timetable, streams=streams, recorded=recorded, runs=runs)
     master = Master(running, recorder)
     master.initialise()
     master.run(pause_at=round(begin))

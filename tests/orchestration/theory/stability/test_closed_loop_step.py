@@ -16,7 +16,7 @@ from tests.commands import Main
 from tests.examples.common import native_example as example
 from tests.places import EXAMPLES
 
-EXAMPLES_MOTOR = EXAMPLES / "dc_motor" / "system.toml"
+MOTOR = EXAMPLES / "dc_motor" / "system.toml"
 GAIN = 3.0 - math.sqrt(3.0)
 """Gain of the feedback of the integrator"""
 
@@ -75,7 +75,7 @@ def test_a_step_of_a_reference_is_that_of_a_run_of_a_linear_loop_of_two_rates(ma
         assert len(both) > 1000
         assert np.diff(both) == pytest.approx(0.0, abs=1e-9)
     document = json.loads(
-        main("step", EXAMPLES_MOTOR, "--to", "wanted", "--of", "motor.speed", "--json", "--out", tmp_path).stdout
+        main("step", MOTOR, "--to", "wanted", "--of", "motor.speed", "--json", "--out", tmp_path).stdout
     )
     assert document["verdict"].startswith("motor.speed follows a step of 1 rad/s of wanted: rises in 5.6 ms, overshoot")
     assert document["remaining_error"] == 0.0
@@ -104,5 +104,5 @@ def test_what_has_no_response_is_refused_in_words() -> None:
 
 def test_step_of_the_command_line_takes_both_names_or_a_component(main: Main) -> None:
     for flags in (["--to", "wanted"], ["--to", "wanted", "--of", "motor.speed", "--component", "controller"]):
-        told = main("step", EXAMPLES_MOTOR, *flags, code=2)
+        told = main("step", MOTOR, *flags, code=2)
         assert "expected --to and --of together, without --component" in told.stderr
