@@ -263,7 +263,7 @@ def _license_of_pythonfmu() -> str:
 
 
 REMARK = "# "
-"""What a printed line begins with that is not the path of a file"""
+"""the beginning of a printed line that is not the path of a file"""
 
 
 def main(arguments: list[str], build: Callable[[Target, Path], Path] = build) -> int:

@@ -94,7 +94,7 @@ class _Precomputing:
         self.made: dict[Function, Function] = {}
         self._kinds: dict[int, tuple[bool, bool]] = {}
         self._read: dict[int, dict[int, Symbol]] = {}
-        """What `as_read` has made, by version and identity"""
+        """the results of `as_read`, by version and identity"""
 
     def function(self, f: Function) -> Function:
         """`f`, with the functions that it calls, reading precomputed values."""

@@ -224,7 +224,7 @@ class Minimum:
     shares: Floats
     cost: float
     own_cost: float | None
-    """that of the values of the base; None: a parameter has none there, or several"""
+    """the cost of the values of the base; None: a parameter has none there, or several"""
     evaluations: int
 
 

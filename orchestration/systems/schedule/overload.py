@@ -19,7 +19,7 @@ INSTEAD = {
     "skip": "releases of {} before its last job is done are skipped",
     "abort": "jobs of {} that are not done at their deadline end there",
 }
-"""What becomes of jobs that have no time, by `overrun`"""
+"""the fate of jobs that have no time, by `overrun`"""
 
 
 def rate_of(of: Task | Message, clock_ratio: float, seen: float) -> float:

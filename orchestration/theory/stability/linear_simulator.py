@@ -19,7 +19,7 @@ class LinearSimulator:
         self.state: Floats = np.zeros(states)
         self.input: Floats = np.zeros(len(inputs))
         self.added: Floats = np.zeros(len(inputs))
-        """What is added to its inputs, connected or not"""
+        """the values added to its inputs, connected or not"""
         self.output: Floats = np.zeros(len(outputs))
         self.sample = 0
         """The number of the next sample, from a begin of the loop's period, of one whose samples differ"""

@@ -131,9 +131,9 @@ class RootLocus:
     without: tuple[str, ...] = ()
     """The values asked for that have no poles, in rising order, and why each: where the loop has no rest, say."""
     moved: int = 0
-    """How many values asked for are replaced by others, at which several rates repeat together."""
+    """The number of values asked for that are replaced by others, at which several rates repeat together."""
     asked: int | None = None
-    """How many values of a period beside others were asked for; None: of another quantity, of which all are tried."""
+    """The number of values asked for, of a period beside others; None: of another quantity, of which all are tried."""
 
     def __repr__(self) -> str:
         return f"<RootLocus: {self.verdict}>"

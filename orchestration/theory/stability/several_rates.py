@@ -36,7 +36,7 @@ class Commensurate:
     meetings: "Meetings"
     """all that are"""
     moved: int = 0
-    """how many of those asked for are none, so that another is in their place"""
+    """the number of values asked for at which the rates never meet, so that another is in their place"""
 
 
 class Meetings:

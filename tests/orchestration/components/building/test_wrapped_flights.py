@@ -78,7 +78,7 @@ def test_theory_and_a_tuning_at_another_period_warn_in_the_words_of_a_run(
         assert main(name, noisy, *others, *slow, "--build").stderr.count(f"warning: {told}\n") == 1, name
     assert not main("expect", noisy, "--build").stderr
     limited = main("limit", noisy, "--of", *between, "--scan", "0.1", *slow, "--json", "--build", "--no-figures")
-    assert json.loads(limited.stdout)["note"].count(told) == 1
+    assert json.loads(limited.stdout)["notes"].count(told) == 1
     tuning = tmp_path / "gains.toml"
     tuning.write_text(
         f'scenario = "{noisy.as_posix()}"\n[cost]\nof = "square"\nby = "expect"\n[search]\nperiods = [0.05, 0.1]\n'
