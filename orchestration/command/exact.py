@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 from orchestration.command.flags import AsSimulated, FlightFlags, ScenarioFile, Timing, flight_options, request_from
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
+from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.terminal import in_columns, warn
 
 if TYPE_CHECKING:
@@ -31,13 +32,16 @@ def expect(
 
 
 def warn_if_means_are_infinite(request: "Request") -> None:
-    """Warn if averages over runs have no finite expectation."""
+    """Warn, after a run, if averages over runs have no finite expectation."""
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
     from orchestration.theory.exact.mean_square import infinite_means_in_words, mean_squares, objectives_of_means
 
     system = system_of(request)
-    (radius,) = mean_squares(request, [system], files_of(system)).radii
+    try:
+        (radius,) = mean_squares(request, [system], files_of(system)).radii
+    except KeyboardInterrupt:
+        raise Interrupted("with the result printed, but means of squares not examined") from None
     if radius is not None and radius >= 1.0:
         warn(infinite_means_in_words(objectives_of_means(system), "", radius))
 

@@ -34,6 +34,8 @@ class CommandResult:
     """Answer of the command in a sentence (`verdicts.py`); None: it has only lines, as paths of files"""
     good: bool = True
     """false: exit code 1"""
+    afterwards: Callable[[], None] | None = None
+    """What is left to be said, and takes long, when the result is printed"""
 
     @property
     def as_json(self) -> str:
@@ -147,8 +149,10 @@ def print_result(result: CommandResult) -> None:
     """Print the result of a command in the form of the flags."""
     text = result.as_json if output_options.as_json else result.as_text
     if text:
-        print(text)
+        print(text, flush=result.afterwards is not None)
         terminal.note(text)
+    if result.afterwards is not None:
+        result.afterwards()
     if not result.good:
         raise typer.Exit(1)
 

@@ -1,6 +1,7 @@
 """The command `run`."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -91,8 +92,6 @@ def run(
         return CommandResult(document={"paused_in": out}, lines=[])
     for warning in result.warnings:
         warn(warning)
-    if result.system.depends_on_seed:
-        exact.warn_if_means_are_infinite(result.request)
     if follows := result.provenance["follows"]:
         inform(f"follows {follows}")
     for loop in result.provenance.get("loops", ()):
@@ -175,4 +174,5 @@ def _metrics(result: "Result") -> CommandResult:
         lines.append(f"{name:<{width}}  {text}{'' if value is None else after(units.get(name))}")
     if result.system.computers or result.system.networks:
         found["missed_deadlines"] = result.missed_deadlines
-    return CommandResult(document=found, verdict=result.verdict, lines=lines)
+    means = partial(exact.warn_if_means_are_infinite, result.request) if result.system.depends_on_seed else None
+    return CommandResult(document=found, verdict=result.verdict, lines=lines, afterwards=means)

@@ -39,7 +39,7 @@ class InfiniteMeans:
     total: int
     """number of points, in as many runs as are looked at"""
     left_out: int
-    """number of those that were too many to be examined"""
+    """number of those that were too many, or have too long a hyperperiod, to be examined"""
 
     @classmethod
     def of(cls, study: Study, files: Files) -> "InfiniteMeans":
@@ -85,7 +85,7 @@ class InfiniteMeans:
         named = [place_of(study.axes, dict(zip(self.axes, point)), units) for point in self.points[:NAMED]]
         more = [f"{len(self.points) - NAMED} more"] if len(self.points) > NAMED else []
         where = f" at {len(self.points)} of {self.total} points ({'; '.join([*named, *more])})" if self.axes else ""
-        where += f", of which {self.left_out} were too many to be examined" if self.left_out else ""
+        where += f", of which {self.left_out} were not examined" if self.left_out else ""
         return infinite_means_in_words(self.metrics, where, self.radius)
 
     def column(self, table: "pd.DataFrame") -> "pd.Series[Any]":

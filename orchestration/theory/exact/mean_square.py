@@ -20,7 +20,7 @@ from orchestration.systems.system.request import Request
 from orchestration.theory.exact.loops import Loops, linearised_as
 from orchestration.theory.exact.objectives import inlined_objectives, means_of
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit, rested
-from orchestration.theory.stability.operating_point import periods_of
+from orchestration.theory.stability.operating_point import hyperperiod, periods_of
 from orchestration.theory.stability.sign_changes import zero_between
 
 LIMIT_TOLERANCE = 0.01
@@ -69,6 +69,8 @@ LONG = 10.0
 """Time from which on a remark says what would be faster [s]"""
 MAX_LINEARISED = 50
 """systems that are linearised: others are examined that differ from them in random times alone"""
+MAX_SAMPLES = 250
+"""Samples in the hyperperiod of a system that is examined; more take long if a plant is in Python"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +80,7 @@ class MeanSquares:
     radii: Sequence[float | None]
     """Mean-square radii by system; None: none is examined, or none is known"""
     left_out: int
-    """number of systems that were too many to be examined"""
+    """number of systems that were too many, or have too long a hyperperiod, to be examined"""
 
     @property
     def infinite(self) -> list[int]:
@@ -97,9 +99,10 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
         if system.depends_on_seed and objectives_of_means(system):
             places.setdefault(replace(system, seed=0).to_toml(), []).append(place)
     chosen = {key: replace(systems[alike[0]], seed=0) for key, alike in places.items()}
-    linear = {key: _linearised_as(system) for key, system in chosen.items()}
+    samples = {key: _samples_in_hyperperiod(system) for key, system in chosen.items()}
+    linear = {key: _linearised_as(chosen[key]) for key, number in samples.items() if number <= MAX_SAMPLES}
     first = {*list(dict.fromkeys(linear.values()))[:MAX_LINEARISED]}
-    keys = [key for key in chosen if linear[key] in first]
+    keys = [key for key in linear if linear[key] in first]
     radii: list[float | None] = [None] * len(systems)
     with suppress(QuadcosimError):
         examined, files = _with_twins([chosen[key] for key in keys], files)
@@ -110,7 +113,19 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
         for key, radius in zip(keys, found):
             for place in places[key]:
                 radii[place] = radius
+    if long := chosen.keys() - linear.keys():
+        where = f" at {sum(len(places[key]) for key in long)} of {len(systems)} points" if len(systems) > 1 else ""
+        inform(
+            f"means of squares not examined{where}: a hyperperiod of {max(samples[key] for key in long)} samples; "
+            "quadcosim expect does, or says why not"
+        )
     return MeanSquares(radii=radii, left_out=sum(len(places[key]) for key in chosen.keys() - {*keys}))
+
+
+def _samples_in_hyperperiod(system: System) -> int:
+    """The number of samples of all components until their instants come again."""
+    periods = periods_of(system)
+    return int(sum(hyperperiod(periods) / period for period in periods))
 
 
 def _with_twins(systems: Sequence[System], files: Files) -> tuple[Sequence[System], Files]:

@@ -4,7 +4,7 @@ import dataclasses
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,11 +21,12 @@ from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
 from orchestration.quadrotor.scenarios.scenario import Scenario
 from orchestration.quadrotor.scenarios.timing import Timing
 from orchestration.systems.expressions.syntax import parse
-from orchestration.systems.system.component import Component
+from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.connection import Source
 from orchestration.systems.system.file import system_from_tables
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import Criterion, System
+from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates.margin import linear_loop_of
 from orchestration.theory.exact import flown, mean_square, moments
 from orchestration.theory.exact.as_simulated import expect_rows
@@ -287,6 +288,42 @@ def test_means_of_squares_say_what_would_be_faster_if_they_take_long(
         monkeypatch.setattr(mean_square, "LONG", long)
         warn_if_means_are_infinite(system)
         assert capsys.readouterr().err.count("by FMUs in Python; quadcosim build --native makes") == remarks
+
+
+def test_rates_far_apart_are_not_examined_by_a_run_and_a_line_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    examined = list[int]()
+
+    def known(systems: Sequence[System], models: object) -> list[float | None]:
+        examined.append(len(systems))
+        return [2.0] * len(systems)
+
+    monkeypatch.setattr(mean_square, "radii_of", known)
+    system = load_system(EXAMPLES / "minimum_variance/system.toml")
+    fast = dataclasses.replace(system.components["controller"], sampling=Sampling(period=0.25))
+    cascade = dataclasses.replace(system, components={**system.components, "inner": fast})
+    near, far = (changed(cascade, {"components.controller.sampling.period": period}) for period in (1.0, 100.0))
+    files = files_of(system)
+    found = mean_square.mean_squares(system, [far, near], files)
+    assert (found.radii, found.left_out, examined) == ([None, 2.0], 1, [1])
+    assert mean_square.mean_squares(system, [far], files).left_out == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"means of squares not examined{where}: a hyperperiod of 401 samples; quadcosim expect does, or says why not"
+        for where in (" at 1 of 2 points", "")
+    ]
+
+
+def test_a_run_that_is_interrupted_while_means_are_examined_has_printed_its_result(
+    main: Main, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(mean_square, "mean_squares", stop)
+    stopped = main("run", EXAMPLES / "minimum_variance/system.toml", "--set", "stop_time=5", code=130)
+    assert "variance" in stopped.stdout
+    assert stopped.stderr.endswith("interrupted with the result printed, but means of squares not examined\n")
 
 
 NO_END = "variance, effort: without a finite expectation"
