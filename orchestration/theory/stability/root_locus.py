@@ -129,7 +129,7 @@ class RootLocus:
     in_double: tuple[str, ...] = ()
     """The components whose float code in C is taken in double precision."""
     without: tuple[str, ...] = ()
-    """The values asked for that have no poles, in rising order, and why each: where the loop has no rest, say."""
+    """The values tried that have no poles, in rising order, and why each: where the loop has no rest, say."""
     moved: int = 0
     """The number of values asked for that are replaced by others, at which several rates repeat together."""
     asked: int | None = None
@@ -148,16 +148,16 @@ class RootLocus:
         first, last = shown(self.values[0]), shown(self.values[-1])
         known = f"(small deviations{of_code(self.in_double)})"
         if self.without:
-            count = len(self.values) + len(self.without)
-            known += f"; no poles at {len(self.without)} of {count} values, as {self.without[0]}"
+            known += f"; no poles at {len(self.without)} of {self.tried} values tried, as {self.without[0]}"
         if self.asked is not None:
             known += f"; {self.tried} values tried, at which all rates repeat together within twenty of the longest"
             known += f": {self.moved} of {self.asked} are moved to {len(self.values)}" if self.moved else ""
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"
-            many = f"{len(self.values)} values from {first} to {last}"
-            return f"{self.of}: poles {begins} the unit circle at each of {many}, {radii} {known}"
+            alike, many = int(((self.radius < 1.0) == (self.radius[0] < 1.0)).sum()), len(self.values)
+            each = f"{'each' if alike == many else alike} of {many} values from {first} to {last}"
+            return f"{self.of}: poles {begins} the unit circle at {each}, {radii} {known}"
         ways = [f"{'leave' if one.leaves else 'return'} {self.place_of(one)}" for one in self.crossings]
         return f"{self.of}: poles {begins} the unit circle at {first}, {some(ways, '; ')} {known}"
 
@@ -281,16 +281,18 @@ class _Tried:
         return True
 
     def crossing(self, below: float, above: float) -> Crossing | None:
-        """Where poles cross between two values; None: they do not, or one of these has none."""
-        if not {below, above} <= self.found.keys() or (self.radius(below) < 1.0) == (self.radius(above) < 1.0):
+        """Where poles cross between two values that have some; None: they do not. Others without any are left out."""
+        if (self.radius(below) < 1.0) == (self.radius(above) < 1.0):
             return None
         inside, outside = sorted((below, above), key=self.radius)
         if self.rates is not None:
-            narrowed(lambda value: self.radius(value) >= 1.0, Bracket(inside, outside), self.rates)
+            narrowed(self._is_outside, Bracket(inside, outside), self.rates)
         else:
             ends = ((below, self.radius(below) - 1.0), (above, self.radius(above) - 1.0))
             inside, outside = zero_between(
-                lambda value: self.radius(value) - 1.0, lambda x: short(x, self._unit), *ends
+                lambda x: self.radius(x) - 1.0 if self.has_poles(x) else math.nan,
+                lambda x: short(x, self._unit),
+                *ends,
             )
         poles, period = self.found[outside]
         pole = complex(max(poles, key=lambda one: (round(abs(one), 9), one.imag)))
@@ -300,6 +302,10 @@ class _Tried:
             turn=turn_of(self.at(outside), period),
         )  # fmt: skip
         return one if one.jumps else replace(one, accuracy=self._accuracy_of(one))
+
+    def _is_outside(self, value: float) -> bool | None:
+        is_known = value not in self.without and self.has_poles(value)
+        return self.radius(value) >= 1.0 if is_known else None
 
     def _accuracy_of(self, one: Crossing) -> float | None:
         growths = {value: math.log(max(self.radius(value), ROUNDING)) / self.found[value][1] for value in self.found}
@@ -314,28 +320,35 @@ class _Tried:
 
 def _crossings(loop: _Tried, tried: list[float], own: float | None) -> list[Crossing]:
     """Where poles cross, in rising order; raises `UsageError` where no value has poles."""
-    crossings = list[Crossing | None]()
+    crossings = dict[tuple[float, float], Crossing | None]()
     done = 0.0
     with progress_bar("poles") as report:
         loop.progress = lambda: report(done)
         # Downward, each crossing at once: the tangent of a plant in a long period holds in shorter ones.
         first = (tried[-1], own if own in tried else tried[0], tried[0])
-        if not (any(map(loop.has_poles, first)) or isinstance(loop.without[tried[0]], NotAnEquilibriumError)):
+        differs = loop.at(tried[0]).uses_scheduler  # whether a schedule repeats, from value to value
+        if not (
+            any(map(loop.has_poles, first)) or differs or isinstance(loop.without[first[2]], NotAnEquilibriumError)
+        ):
             raise loop.without[tried[-1]]
         for place in range(len(tried) - 2, -1, -1):
-            loop.has_poles(tried[place])
-            crossings.append(loop.crossing(tried[place], tried[place + 1]))
+            pair = tried[place], tried[place + 1]
+            if loop.has_poles(pair[0]) and pair[1] in loop.found:
+                crossings[pair] = loop.crossing(*pair)
             done = 1.0 - place / len(tried)
         if not loop.found:
             raise loop.without[tried[-1]]
-        for below, value, above in zip(tried, tried[1:], [*tried[2:], math.nan]):  # near a rest that is known now
-            if below in loop.found and value in loop.without and loop.has_poles(value):
-                crossings += [loop.crossing(below, value), loop.crossing(value, above)]
+        for below, value in pairwise(tried):  # near a rest that is known now
+            if below in loop.found and value in loop.without:
+                loop.has_poles(value)
+        for pair in pairwise(value for value in tried if value in loop.found):
+            if pair not in crossings:
+                crossings[pair] = loop.crossing(*pair)
         known_before = 0
         while loop.rates is not None and known_before < len(loop.found):  # narrowing may have found others between
             known_before = len(loop.found)
-            crossings = [loop.crossing(*pair) for pair in pairwise(sorted(loop.found.keys() | loop.without.keys()))]
-    return sorted((one for one in crossings if one is not None), key=lambda one: one.value)
+            crossings = {pair: loop.crossing(*pair) for pair in pairwise(sorted(loop.found))}
+    return sorted((one for one in crossings.values() if one is not None), key=lambda one: one.value)
 
 
 def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
@@ -355,7 +368,6 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
         if not values:
             raise UsageError(f"{varied.of}: several rates, which repeat together at no value of the range")
         crossings = _crossings(loop, _beside_jumps(varied, system, values), own)
-    refused = [value for value in values if value in loop.without]
     values = [value for value in values if value in loop.found]
     each = [loop.found[value][0] for value in values]
     poles = np.full((len(values), max(map(len, each))), np.nan, dtype=complex)
@@ -368,7 +380,7 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
         crossings=tuple(crossings),
         curve=np.array([(x, loop.radius(x) if x in loop.found else math.nan) for x in tried]).T,
         in_double=are_in_double({name: one for name, (one, _, _) in loop.known.items()}),
-        without=tuple(str(loop.without[value]) for value in refused),
+        without=tuple(str(loop.without[value]) for value in sorted(loop.without)),
         moved=0 if loop.rates is None else loop.rates.moved, asked=None if loop.rates is None else len(every),
     )  # fmt: skip
 

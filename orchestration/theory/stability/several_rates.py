@@ -20,6 +20,8 @@ MOST_BETWEEN = 10_000
 """Most values between two others that are looked at, those of the simplest ratios"""
 DIGITS, ROUNDING = 6, 1e-12
 """Digits of such a value at most, so that it is the one that is printed, and what is no difference from it, relative"""
+MOST_UNKNOWN = 8
+"""Most values that are left out between two, as nothing is known of them"""
 NEAR = 1.0 / 64.0
 """Distance from a value, relative, within which another is sought first"""
 
@@ -119,16 +121,18 @@ def commensurate(
     return Commensurate(scan=[*known], longest_first=longest_first, meetings=meetings, moved=moved)
 
 
-def narrowed(grows: Callable[[float], bool], bracket: Bracket, rates: Commensurate) -> Bracket:
+def narrowed(grows: Callable[[float], bool | None], bracket: Bracket, rates: Commensurate) -> Bracket:
     """The bracket bisected by all values in it at which the rates meet, until that before its good end is good, too.
 
     So has to be the one of the simplest ratio that it has passed by, where a loop is most often unstable by itself.
-    Between values at which it is unstable, a loop may be stable at one, as at a multiple of another period.
+    Between values at which it is unstable, a loop may be stable at one, as at a multiple of another period. A value at
+    which it is not known whether it is, None, is left out: the next is that of the simplest ratio, and after
+    `MOST_UNKNOWN` the bracket stays.
     """
     good, bad = bracket
     assert good is not None
     down = bad < good
-    scan = sorted(rates.scan, reverse=down)
+    scan, unknown = sorted(rates.scan, reverse=down), 0
 
     def before(values: list[float], end: float) -> list[float]:
         return [x for x in values if (x > end if down else x < end)]
@@ -137,16 +141,24 @@ def narrowed(grows: Callable[[float], bool], bracket: Bracket, rates: Commensura
         begin = (before(scan, good) or [good])[-1]
         fine = sorted(rates.meetings.between(begin, bad), reverse=down)
         start, between = good, [x for x in before(fine, bad) if before([good], x)]
-        while between:
+        is_bad: bool | None = False
+        while between and unknown < MOST_UNKNOWN:
             half = len(between) // 2
-            if grows(between[half]):
+            if is_bad is None:
+                half = between.index(min(between, key=rates.meetings.period_with))
+            is_bad = grows(between[half])
+            if is_bad is None:
+                between.pop(half)
+                unknown += 1
+            elif is_bad:
                 bad, between = between[half], between[:half]
             else:
                 good, between = between[half], between[half + 1 :]
         passed = before(fine, good)
         simplest = sorted((x for x in passed if before([start], x)), key=rates.meetings.period_with)[:1]
         unstable = next((x for x in (*simplest, *passed[-1:]) if grows(x)), None)
-        stable = None if unstable is None else next((x for x in reversed(before(scan, unstable)) if not grows(x)), None)
+        nearest = reversed([] if unstable is None else before(scan, unstable))
+        stable = next((x for x in nearest if grows(x) is False), None)
         if unstable is None or stable is None:
             return Bracket(good, bad)
         good, bad = stable, unstable

@@ -43,7 +43,7 @@ def zero_between(
     """Where a function passes 0 between two points (x, y) with y of opposite signs: by secants, later by halves.
 
     A point that stays counts half the next time (the Illinois rule). Two x: that of y below 0, then that above. They
-    are one where the function is 0, and neighbours where it jumps.
+    are one where the function is 0, neighbours where it jumps, and farther apart where it is NaN between them.
     """
     stays = False
     for trial in range(TRIALS):
@@ -53,6 +53,10 @@ def zero_between(
         if not a < middle < b:
             break
         value = of(middle)
+        if math.isnan(value) and middle != half:
+            middle, value = half, of(half)
+        if math.isnan(value):
+            break
         if abs(value) < zero:
             return middle, middle
         is_low = (value < 0.0) == (below < 0.0)

@@ -59,19 +59,26 @@ def test_values_without_poles_take_nothing_from_the_others(monkeypatch: pytest.M
     """Only a range without any is refused."""
 
     def refusing(system: System, *rest: Any, **named: Any) -> Any:
-        if system.connections[-1].delay > worst:
+        if worst < system.connections[-1].delay < best:
             raise UsageError("no rest")
         return whole_at_rest(system, *rest, **named)
 
     monkeypatch.setattr(root_locus, "whole_at_rest", refusing)
-    worst = 0.015
+    worst, best = 0.015, 1.0
     found = locus(example("dc_servo"), DELAY, first=0.0, last=0.028, count=3)
     assert found.values.tolist() == [0.0, 0.002, 0.014]
     assert found.verdict == (
         f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations); "
-        f"no poles at 1 of 4 values, as {DELAY} = 0.028: no rest"
+        f"no poles at 1 of {found.tried} values tried, as {DELAY} = 0.028: no rest"
     )
-    worst = -1.0
+    worst, best = 0.013, 0.0145
+    found = locus(example("dc_servo"), DELAY, first=0.007, last=0.021, count=3)
+    assert (found.values.tolist(), (found.radius < 1.0).tolist()) == ([0.007, 0.021], [True, False])
+    (crossing,) = found.crossings
+    assert 0.007 <= crossing.value <= worst < best <= crossing.until <= 0.021
+    assert "at 7 ms, leave between " in found.verdict
+    assert f"{DELAY} = 0.014: no rest" in found.without
+    worst, best = -1.0, 1.0
     with pytest.raises(UsageError, match=f"{DELAY} = 0.028: no rest"):
         locus(example("dc_servo"), DELAY, first=0.0, last=0.028, count=3)
 
@@ -156,6 +163,8 @@ def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None
     assert alone is not None
     passed_by = narrowed(lambda value: value == 0.0072 or value >= 0.00722, Bracket(0.007, 0.0075), alone)
     assert passed_by == (0.00719, 0.0072)
+    few = narrowed(lambda x: x >= 0.00722 if round(x * 1e7) % 400 == 0 else None, Bracket(0.007, 0.0075), alone)
+    assert few == (0.0072, 0.00724)
 
 
 def test_a_locus_of_one_value_is_refused() -> None:
