@@ -27,6 +27,7 @@ from orchestration.systems.system.check import check, connect_references, descri
 from orchestration.systems.system.component import (
     OWN_PERIOD,
     Component,
+    OwnPeriod,
     Sampling,
     has_scheduled_instants,
     instance_of,
@@ -307,7 +308,7 @@ def never_computed(system: System, models: Mapping[str, Model]) -> frozenset[str
 
 def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str, tuple[float, float]]:
     """The components whose code believes another sampling period than theirs: theirs, also their step or that of their
-    task on a computer, and what it believes [s].
+    task on a computer, and what it believes [s]. Code with a parameter that follows the period is told it.
     """
     models = _as_asked(system, models)
     samplings = {name: component.sampling for name, component in system.components.items()}
@@ -318,7 +319,9 @@ def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str,
     return {
         name: (period, believed)
         for name, period in periods.items()
-        if (believed := models[name].believed_period) is not None and not math.isclose(believed, period, rel_tol=1e-6)
+        if not any(isinstance(value, OwnPeriod) for value in system.components[name].parameters.values())
+        and (believed := models[name].believed_period) is not None
+        and not math.isclose(believed, period, rel_tol=1e-6)
     }
 
 

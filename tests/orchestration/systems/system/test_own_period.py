@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestration.components.fmi.read_description import read_model
+from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.documents import tables_in
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.engines.resolved import kept_periods_in_words
+from orchestration.simulation.engines.resolved import kept_periods_in_words, other_periods_in_words
 from orchestration.systems.system.check import check
 from orchestration.systems.system.component import OWN_PERIOD, Component, Sampling
 from orchestration.systems.system.computers import Computer, Task
@@ -94,6 +94,15 @@ def test_a_law_that_keeps_the_period_of_its_file_is_told_how_it_follows(tmp_path
         assert kept_periods_in_words(keeps, other, models) == []
     follows = changed(keeps, {FOLLOWS: OWN_PERIOD})
     assert kept_periods_in_words(follows, changed(follows, {CLOCK: 0.02}), models) == []
+
+
+def test_code_that_is_told_its_period_believes_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Model, "believed_period", 0.01)
+    models = {"law": read_model(described(tmp_path, "Law", parameters={"period": "Real s"}))}
+    told = changed(SYSTEM, {CLOCK: 0.02})
+    assert other_periods_in_words(told, models) == []
+    (remark,) = other_periods_in_words(changed(told, {FOLLOWS: 0.01}), models)
+    assert remark.startswith("law (Law): its code believes 0.01 s; at other periods")
 
 
 def test_a_state_at_rest_serves_another_period_only_with_the_parameter_that_follows_it() -> None:
