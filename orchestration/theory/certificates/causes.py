@@ -60,7 +60,17 @@ class ScheduledLoop:
         and for more than one delayed component.
         """
         self._loop, self._system, self._cause = loop, system, cause
-        self.family(0.0)
+        try:
+            self.family(0.0)
+        except UsageError as error:
+            raise UsageError(
+                f"{error}; so it is at 0 s, too, and no value has a proof: limit --of {cause.path} flies it"
+            ) from error
+
+    @property
+    def tolerance(self) -> float:
+        """That of the largest value [s]."""
+        return FINE * self._cause.period
 
     def family(self, value: float) -> LoopFamily:
         """The family for draws up to a value [s]; raises `UsageError` as above."""
@@ -73,13 +83,17 @@ class ScheduledLoop:
         """The largest value for which there is a family [s]."""
 
         def fails(value: float) -> bool:
-            try:
-                self.family(value)
-            except UsageError:
-                return True
-            return False
+            return bool(self.refusal(value))
 
-        return floor_to_nanoseconds(bisected(fails, 0.0, self._cause.period, FINE * self._cause.period).good or 0.0)
+        return floor_to_nanoseconds(bisected(fails, 0.0, self._cause.period, self.tolerance).good or 0.0)
+
+    def refusal(self, value: float) -> str:
+        """Why there is no family for draws up to a value [s]; empty where there is one."""
+        try:
+            self.family(value)
+        except UsageError as error:
+            return str(error).removeprefix(f"{self._cause.path}: ")
+        return ""
 
     def value_of(self, family: LoopFamily) -> float:
         """The largest value [s] whose windows are no wider than those of a family."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,6 +78,10 @@ class Certified:
     """Why it is the largest; empty: it is `last`."""
     not_sought: str = ""
     """Why no proof was sought; empty: one was."""
+    unproved: float | None = None
+    """Least value for which a proof was sought, and none was found; None: each had one."""
+    refused: str = ""
+    """Why proofs were sought no further, of a cause; empty: `largest` or `breaking` is the end."""
     searched: str
     """Sequences that were tried for `breaking`, as text."""
     states: int
@@ -102,6 +107,10 @@ class Certified:
                 proved += f", less than the file's {shown(self.own)}, for which nothing is proved"
                 if self.breaking is None or self.own < self.breaking:
                     proved += " (no sign that it is unstable)"
+            if self.unproved is not None:
+                proved += f"; no proof was found for {shown(self.unproved)}"
+            elif self.refused:
+                proved += f" (beyond, no proof is sought: {self.refused})"
         beyond = f" ({self.beyond})" if self.beyond else ""
         broken = f"none found up to {shown(self.largest)}, the most that is tried{beyond}, that breaks the loop"
         if self.searched == NOT_SEARCHED:
@@ -258,15 +267,15 @@ def _of_times(timeline: LoopTimeline, varying: Varying, last: float | None, prog
         return Certified(of=varying.path, breaking=0, largest=largest, searched=searched, states=states)
     broken = least_breaking(up_to, largest)
     top = largest if broken is None else broken.value
-    value, certificate, not_sought = None, None, not_sought_for(up_to(top))
+    most, not_sought = LargestCertified(), not_sought_for(up_to(top))
     if not not_sought:
-        value, certificate = largest_certified(lambda value: timeline.family([value]), [varying.path], top, progress)
+        most = largest_certified(lambda value: timeline.family([value]), [varying.path], top, progress)
     return Certified(
-        of=varying.path, certified=value, beyond=beyond, not_sought=not_sought,
+        of=varying.path, certified=most.value, unproved=most.unproved, beyond=beyond, not_sought=not_sought,
         breaking=None if broken is None else broken.value,
         breaking_sequence=() if broken is None else broken.sequence,
         small_gain=small_gain(timeline.loop, varying), largest=largest, searched=searched,
-        states=len(up_to(top).kept), certificate=certificate,
+        states=len(up_to(top).kept), certificate=most.certificate,
     )  # fmt: skip
 
 
@@ -311,16 +320,27 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
     largest = scheduled.largest()
     top = largest if search.breaking is None else min(largest, search.breaking)
     tried = largest if search.last is None else search.last
-    value, certificate, not_sought = None, None, not_sought_for(scheduled.family(0.0))
+    most, not_sought = LargestCertified(), not_sought_for(scheduled.family(0.0))
     if search.breaking != 0.0 and not not_sought:
-        value, certificate = largest_certified(scheduled.family, [cause.path], top, progress)
+        most = largest_certified(scheduled.family, [cause.path], top, progress)
     return Certified(
-        of=cause.path, certified=value, breaking=search.breaking,
+        of=cause.path, certified=most.value, unproved=most.unproved, breaking=search.breaking,
+        refused=scheduled.refusal(largest + scheduled.tolerance) if most.value == largest else "",
         breaking_sequence=search.sequence, searched=search.searched,
         largest=tried if search.breaking is None else largest, own=highest_at(system, cause.path),
-        states=len(scheduled.family(0.0).kept), certificate=certificate, not_sought=not_sought,
+        states=len(scheduled.family(0.0).kept), certificate=most.certificate, not_sought=not_sought,
         in_double=are_in_double(loop.system.components),
     )  # fmt: skip
+
+
+class LargestCertified(NamedTuple):
+    """How far proofs reach."""
+
+    value: float | None = None
+    """Largest value with a certificate; None: even 0 has none"""
+    certificate: str | None = None
+    unproved: float | None = None
+    """Least value that was tried in vain; None: each had one"""
 
 
 def largest_certified(
@@ -329,12 +349,12 @@ def largest_certified(
     top: float,
     progress: Share,
     shares: Sequence[float] | None = None,
-) -> tuple[float | None, str | None]:
-    """The largest value below `top` with a certificate, and that certificate; None where even 0 has none."""
+) -> LargestCertified:
+    """The largest value up to `top` with a certificate, and the least above it that was tried in vain."""
     from orchestration.theory.certificates.find_certificate import find_certificate
 
     first, *more = shares or SHARES
-    best: tuple[float | None, str | None] = (None, None)
+    best = LargestCertified()
     step, attempts = 0, 0
 
     def works(share: float) -> bool:
@@ -343,8 +363,10 @@ def largest_certified(
         progress(1.0 - 0.5 * 0.7**attempts)
         value = floor_to_nanoseconds(share * top)
         found = find_certificate(family_up_to(value), of, step)
-        if found is not None:
-            best, step = (value, found.certificate.to_json()), found.step
+        if found is None:
+            best = best._replace(unproved=value)
+        else:
+            best, step = best._replace(value=value, certificate=found.certificate.to_json()), found.step
         return found is not None
 
     if works(first):
@@ -355,7 +377,7 @@ def largest_certified(
     while high - low > FINEST:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if works(middle) else (low, middle)
-    if best[0] is None:
+    if best.value is None:
         works(0.0)
     return best
 

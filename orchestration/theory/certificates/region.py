@@ -120,7 +120,7 @@ def margin_region(
             top = floor_to_nanoseconds(timeline.largest() - a) if broken is None else broken.value
             if broken is not None:
                 breaking.append((a, broken.value))
-            b, text = margin.largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
+            b, text, _ = margin.largest_certified(_second_varies(timeline, a), paths, top, lambda share: None, SHARES)
             if b is not None and text is not None:
                 certified.append((a, b))
                 texts.append(text)

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.theory.certificates.certified_loop import (
     DELAY,
     JITTER,
@@ -21,7 +22,7 @@ from orchestration.theory.certificates.certified_loop import (
     Point,
     Varying,
 )
-from orchestration.theory.certificates.course import Courses, PieceAt, Steps, time_at
+from orchestration.theory.certificates.course import Courses, Jump, PieceAt, Steps, time_at
 from orchestration.theory.certificates.family import Letter, LoopFamily
 from orchestration.theory.exact.random_times import (
     ATTOSECONDS,
@@ -189,8 +190,27 @@ class LoopTimeline:
         steps = _about(of, middle, [limit > 0 for limit in draws.largest])
         times = [time_at(step, corner) for step in steps if isinstance(step, tuple) for corner in corners]
         if min(times) < 0 or not all(same(of(corner), steps, corner) for corner in corners):
-            raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events")
+            changes = self._changes_text(steps, corners)
+            raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events; {changes}")
         return [(box, steps) for box in draws.boxes()]
+
+    def _changes_text(self, steps: Steps, corners: Sequence[Point]) -> str:
+        """Which draws change the order of which events."""
+        owners = {DELAY: "delays of", LATENCY: "messages of"}
+        longest = [max(along) for along in zip(*corners)]
+        draws = " and ".join(
+            f"{owners.get(each.kind, 'samples of')} {each.name} up to {_text(most)} late"
+            for each, most in zip(self._timed, longest)
+        )
+        for i, step in enumerate(steps):
+            times = [time_at(step, corner) for corner in corners] if isinstance(step, tuple) else [0]
+            if min(times) < 0:
+                before = [x.name for x in steps[:i] if isinstance(x, Jump)]
+                after = [x.name for x in steps[i + 1 :] if isinstance(x, Jump)]
+                if before and after:
+                    gaps = f"from {_text(max(times))} before to {_text(-min(times))} after"
+                    return f"with {draws}, '{before[-1]}' is {gaps} '{after[0]}'"
+        return f"with {draws}, events of one instant change theirs"
 
     def _paths_text(self) -> str:
         return " and ".join(dict.fromkeys(each.path for each in self.varying))
@@ -204,6 +224,11 @@ def _orders(of: PieceAt, limit: int) -> Iterator[tuple[Box, Steps]]:
         high = min([limit, *(t[0] // -t[1] for t in steps if isinstance(t, tuple) and t[1] < 0)])
         yield ((low, high),), steps
         low = high
+
+
+def _text(time: int) -> str:
+    """A time [attoseconds] in its unit."""
+    return quantity(time / ATTOSECONDS, "s")
 
 
 def _about(of: PieceAt, point: Point, varies: Sequence[bool]) -> Steps:

@@ -85,6 +85,9 @@ def test_a_loggers_execution_is_certified_below_what_breaks_the_loop(found: Cert
     assert found.breaking == pytest.approx(0.4, abs=1e-3)  # twice that and the control fill the processor
     assert found.breaking_sequence == (("2 jobs", (found.breaking,)),)
     assert found.largest < 0.45
+    assert found.unproved is not None
+    assert found.certified < found.unproved < found.breaking
+    assert f"; no proof was found for {1e3 * found.unproved:.4g} ms, one of" in found.verdict
 
 
 def test_what_breaks_a_loop_does_so_where_it_is_run(found: Certified) -> None:
@@ -174,6 +177,7 @@ def test_where_nothing_is_made_late_all_that_is_looked_at_is_certified(tmp_path:
     assert found.certified == found.largest == pytest.approx(0.1, abs=1e-3)
     assert found.breaking is not None
     assert found.breaking > found.largest
+    assert "(beyond, no proof is sought: computers.node.tasks.control: may respond after 0.2000" in found.verdict
     assert check_certificate(found.save(tmp_path / "certificate.json"), logical).up_to == found.largest
 
 
@@ -242,6 +246,18 @@ def test_two_components_that_are_late_are_refused() -> None:
     at_ease = {f"computers.node.tasks.{name}.execution": 0.0005 for name in ("slow", "middle", "fast")}
     with pytest.raises(UsageError, match=r"slow\.execution: delays slow, middle; expected one delayed component"):
         margin(changed(system, at_ease), "computers.node.tasks.slow.execution")
+
+
+def test_where_draws_change_the_order_of_events_they_are_named() -> None:
+    node = "computers.node.tasks"
+    own = {f"{node}.{name}.execution": 0.0005 for name in ("slow", "middle", "fast")}
+    certain = {f"{node}.middle.read": "release", f"{node}.middle.write": "deadline"}
+    with pytest.raises(UsageError) as refused:
+        margin(changed(example("three_servos"), own | certain), f"{node}.slow.execution")
+    draws = "samples of slow up to 1 ms late and messages of slow up to 1 ms late"
+    events = "'slow samples' is from 500 µs before to 500 µs after 'fast_command arrives'"
+    assert f"do not change the order of events; with {draws}, {events}; so it is at 0 s, too" in str(refused.value)
+    assert str(refused.value).endswith(f"no value has a proof: limit of {node}.slow.execution flies it")
 
 
 def test_a_path_of_something_else_is_refused() -> None:

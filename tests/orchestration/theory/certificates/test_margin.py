@@ -207,6 +207,8 @@ def test_a_value_of_the_file_beyond_what_is_certified_is_in_the_verdict() -> Non
     less = "every sequence up to 1 ms is stable, less than the file's 1.2 ms, for which nothing is proved"
     assert f"{less} (no sign that it is unstable), none found" in found.verdict
     assert f"{less}, one of 1.1 ms breaks the loop" in replace(found, breaking=0.0011).verdict
+    in_vain = replace(found, unproved=0.0011).verdict
+    assert f"{less} (no sign that it is unstable); no proof was found for 1.1 ms, none found" in in_vain
     assert "the file's" not in replace(found, own=0.001).verdict
     assert certificates.highest_at(changed(example("double_integrator"), {COMMAND: 0.002}), COMMAND) == 0.002
 
