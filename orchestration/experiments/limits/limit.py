@@ -25,9 +25,9 @@ from orchestration.simulation.workers.executors import RunEvaluator
 from orchestration.systems.schedule.overload import overloads_in_words
 from orchestration.systems.system.files import Files, files_of
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.theory.exact.examined_limit import local_limits
 from orchestration.theory.exact.mean_square import mean_square_limit
 from orchestration.theory.stability.known_loops import LinearLimit
-from orchestration.theory.stability.local_limit import local_limits
 
 GAP = 0.1
 """Share of the local limit: a larger difference to the large-signal limit is noted"""
@@ -109,7 +109,7 @@ def limit(
         report(1.0)
     failed = tuple(value for value, one in trials.tried.items() if not one.is_good)
     with share_reporter(progress, "limits by linear theory"):  # without shares, as it ends where the limit is
-        local = _by_theory("local", files, local_limits, varied, replace(span, also=failed))
+        local = _by_theory("local", files, local_limits, varied, replace(span, also=failed), models)
         mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
     scheduled = sorted(trials.tried) if varied.system.computers or varied.system.networks else []
     missed_from = _missed_from(varied, span, scheduled)

@@ -42,22 +42,25 @@ NEAR = 0.1
 
 Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
+Examined = Callable[[Callable[[float], System], Range], LinearLimit | None]
+"""Another way to the limit of a system with computers or networks; None: it has no value there, either"""
 
 
-def local_limits(varied: Varied, span: Range) -> LinearLimit:
+def local_limits(varied: Varied, span: Range, examined: Examined | None = None) -> LinearLimit:
     """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs.
 
-    A kind of request in `LOOPS` has its own method.
+    With computers or networks by `examined` before twin runs, which a schedule that repeats late misleads. A kind of
+    request in `LOOPS` has its own method.
     """
     known = LOOPS.of(varied.request.kind)
     if known is not None:
         return known.local_limits(varied, span)
     if not varied.system.operating_point:
         return LinearLimit(reason="no local limit: the system file names no operating_point")
-    return about_rest(varied.at, span)
+    return about_rest(varied.at, span, examined)
 
 
-def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
+def about_rest(at: Callable[[float], System], span: Range, examined: Examined | None = None) -> LinearLimit:
     """The local limit of any system; `at` makes the system for a value of the quantity."""
     try:
         if deterministic(at(span.first)) == deterministic(at(span.last)):
@@ -73,6 +76,8 @@ def about_rest(at: Callable[[float], System], span: Range) -> LinearLimit:
         why = str(error)
     if commensurate(at, span.values()) is not None:
         return LinearLimit(reason=f"no local limit: several rates, and no spectral radius: {why}")
+    if examined is not None and at(span.last).uses_scheduler and (known := examined(at, span)) is not None:
+        return replace(known, method=f"{known.method} (no spectral radius: {why})")
     try:
         found = _by_twins(at, span)
     except (UsageError, SimulatorError) as error:

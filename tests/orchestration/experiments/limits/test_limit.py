@@ -525,7 +525,7 @@ def stubbed(monkeypatch: pytest.MonkeyPatch) -> type[StubPool]:
 _KNOWN: dict[str, LinearLimit] = {}
 
 
-def known_local_limits(varied: Varied, span: Range) -> LinearLimit:
+def known_local_limits(varied: Varied, span: Range, *_: object) -> LinearLimit:
     """The local limits of linear theory, computed once for the tests with the same scenario."""
     key = f"{varied.of} {varied.request}"
     if key not in _KNOWN:
