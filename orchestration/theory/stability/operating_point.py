@@ -110,9 +110,11 @@ def turn_of(system: System, period: float) -> float | None:
     return math.tau / period if period > 1.5 * float(min(periods_of(system))) / NANOSECONDS else None
 
 
-def beside_others(at: Callable[[float], System], first: float, last: float) -> tuple[list[Fraction], float] | None:
+def beside_others(
+    at: Callable[[float], System], first: float, last: float, periods: Callable[[System], list[Fraction]] = periods_of
+) -> tuple[list[Fraction], float] | None:
     """The other periods [ns] of a loop of which a quantity is one, and its value by nanosecond; None: it is none."""
-    ends = list(zip(*(periods_of(at(value)) for value in (first, last))))
+    ends = list(zip(*(periods(at(value)) for value in (first, last))))
     others, varied = sorted({b for a, b in ends if a == b}), [b for a, b in ends if a != b]
     return (others, last / float(varied[0])) if varied and others else None
 

@@ -148,7 +148,7 @@ def periodic_schedule(
         whole = hyperperiod(other_periods) if other_periods else exact_nanoseconds(horizon) / NANOSECONDS
         period = math.ceil(exact_nanoseconds(horizon) / NANOSECONDS / whole) * whole
         return ScheduleTrace(system, end).schedule_between(0, end, period) or NO_SCHEDULE
-    begin, length = _begin_and_hyperperiod(_instants(system))
+    begin, length = begin_and_hyperperiod(instants(system))
     count = WINDOWS
     while True:
         trace = ScheduleTrace(system, begin + count * length)
@@ -162,7 +162,7 @@ def periodic_schedule(
         count *= 2
 
 
-def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
+def instants(system: System) -> list[tuple[Fraction, Fraction]]:
     """The offset and the period [ns] of everything periodic that shares a resource."""
     over, releases = messages_by_connection(system), released_by(system)
     senders = {x.sender for x in system.connections if x.name in over or x.name in releases}
@@ -179,8 +179,11 @@ def _instants(system: System) -> list[tuple[Fraction, Fraction]]:
     return grids + [(Fraction(0), cycle) for cycle in cycles]
 
 
-def _begin_and_hyperperiod(instants: Sequence[tuple[Fraction, Fraction]]) -> tuple[int, int]:
-    """A multiple of the hyperperiod by which all have begun, and the hyperperiod [ns]."""
+def begin_and_hyperperiod(instants: Sequence[tuple[Fraction, Fraction]]) -> tuple[int, int]:
+    """A multiple of the hyperperiod by which all have begun, and the hyperperiod [ns].
+
+    Raises `UsageError` where it is too long for its jobs.
+    """
     periods = [period for _, period in instants] or [Fraction(NANOSECONDS)]
     length = hyperperiod(periods).numerator  # a multiple, where it is no whole number
     begin = math.ceil(max((offset for offset, _ in instants), default=Fraction(0)) / length) * length

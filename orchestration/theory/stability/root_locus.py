@@ -206,8 +206,8 @@ def locus(
     the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
     times that of the file, delays up to ten periods or twice that of the file. Values are `count`, default 40, evenly
     spaced, over more than a decade by equal factors, and the file's own. A period beside others has poles where all
-    rates repeat together within twenty of the longest: another value is moved to that of the simplest ratio within half
-    of the way to the next, else to the nearest, and crossings are between two such. Holds and delays are included;
+    rates repeat together within twenty of the longest: another value is moved to the multiple of most others within
+    half of the way to the next, else to the nearest, and crossings are between two such. Holds and delays are included;
     jitter, loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen,
     but for jumps of a delay to a sampled component: both sides of each are tried.
 

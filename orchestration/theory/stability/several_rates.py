@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from orchestration.foundation.basics.bisection import Bracket
+from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.operating_point import (
     LONGEST_HYPERPERIOD,
     beside_others,
     hyperperiod,
     hyperperiod_of,
+    periods_of,
 )
+from orchestration.theory.stability.periodic_schedule import begin_and_hyperperiod, instants
 
 MOST_MULTIPLES = 200
 """Most multiples of the other periods that are tried beside the values of the scan"""
@@ -46,14 +49,15 @@ class Meetings:
 
     def __init__(self, others: Sequence[Fraction], unit: float) -> None:
         """The other periods [ns], and the value of the period by nanosecond."""
-        self._whole, self._longest, self._unit = hyperperiod(others), max(others), unit
+        self._others, self._whole, self._longest, self._unit = others, hyperperiod(others), max(others), unit
 
     def between(self, low: float, high: float) -> list[float]:
         """Those from one value to another, in rising order."""
         low, high = sorted((low, high))
         size, found = float(self._whole) * self._unit, set[float]()
         most = math.floor(LONGEST_HYPERPERIOD * self._longest / self._whole)  # of p, in a period that is p / q of all
-        largest = max(LONGEST_HYPERPERIOD, math.floor(LONGEST_HYPERPERIOD * float(self._longest) * self._unit / low))
+        farthest = math.floor(LONGEST_HYPERPERIOD * float(self._longest) * self._unit / low)
+        largest = min(MOST_BETWEEN, max(LONGEST_HYPERPERIOD, farthest))
         for q in range(1, largest + 1):
             first, last = (one * q / size for one in (low, high))
             every = range(math.ceil(first - ROUNDING * first), math.floor(last + ROUNDING * last) + 1)
@@ -70,12 +74,13 @@ class Meetings:
     def instead(self, values: Sequence[float], k: int) -> float:
         """The one that takes the place of value `k` of some in rising order.
 
-        Within half of the way to its neighbours it is the one of the simplest ratio, else the nearest; NaN: none.
+        Within half of the way to its neighbours it is the multiple of the most others, at one phase of these, of such
+        that of the simplest ratio; else the nearest; NaN: none.
         """
         value, (first, last) = values[k], (values[0], values[-1])
         below, above = (0.5 * (value + values[min(max(0, each), len(values) - 1)]) for each in (k - 1, k + 1))
         if near := self.between(below, above):
-            return min(near, key=lambda one: (self.period_with(one), abs(one - value)))
+            return min(near, key=lambda one: (*self._ratio_of(one), abs(one - value)))
         share = NEAR
         while not near and share < last / first:
             near = self.between(max(first, value / (1.0 + share)), min(last, value * (1.0 + share)))
@@ -84,7 +89,14 @@ class Meetings:
 
     def period_with(self, value: float) -> Fraction:
         """The hyperperiod of a value and the others [ns]."""
-        return hyperperiod([self._whole, Fraction(f"{value / self._unit:.12g}")])
+        return hyperperiod([self._whole, self._period_of(value)])
+
+    def _ratio_of(self, value: float) -> tuple[int, Fraction]:
+        period = self._period_of(value)
+        return sum(period % other != 0 for other in self._others), self.period_with(value)
+
+    def _period_of(self, value: float) -> Fraction:
+        return Fraction(f"{value / self._unit:.12g}")
 
 
 def commensurate(
@@ -92,9 +104,10 @@ def commensurate(
 ) -> Commensurate | None:
     """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period.
 
-    `instead`: one in the place of each value, and no multiples of the others between them.
+    `instead`: one in the place of each value, and no multiples of the others between them; others are then also the
+    periods of what shares a processor or a network.
     """
-    beside = beside_others(at, values[0], values[-1])
+    beside = beside_others(at, values[0], values[-1], _with_shared if instead else periods_of)
     if beside is None:
         return None
     others, unit = beside
@@ -105,7 +118,12 @@ def commensurate(
         return [float(f"{k * step:.12g}") for k in range(math.ceil(first / step), math.floor(last / step) + 1)]
 
     def repeating(some: Iterable[float]) -> dict[float, Fraction]:
-        each = {value: hyperperiod_of(at(value)) for value in sorted(some)}
+        each = {
+            value: hyperperiod_of(system)
+            for value in sorted(some)
+            for system in [at(value)]
+            if not instead or _is_scheduled(system)
+        }
         return {value: period for value, period in each.items() if period is not None}
 
     if instead:
@@ -119,6 +137,19 @@ def commensurate(
         known, moved = repeating({*values, *few}), 0
     longest_first = sorted(known, key=known.__getitem__, reverse=True)
     return Commensurate(scan=[*known], longest_first=longest_first, meetings=meetings, moved=moved)
+
+
+def _with_shared(system: System) -> list[Fraction]:
+    return [*periods_of(system), *(period for _, period in instants(system))]
+
+
+def _is_scheduled(system: System) -> bool:
+    """Whether what shares a processor or a network repeats soon enough to be followed."""
+    try:
+        begin_and_hyperperiod(instants(system))
+    except UsageError:
+        return False
+    return True
 
 
 def narrowed(grows: Callable[[float], bool | None], bracket: Bracket, rates: Commensurate) -> Bracket:

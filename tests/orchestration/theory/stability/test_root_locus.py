@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from orchestration.foundation.basics.bisection import Bracket, Range
 from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.computers import Computer, Task
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import root_locus
@@ -156,6 +157,12 @@ def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None
     wide = commensurate(two, [0.0002, 0.000356, 0.000632, 0.00112, 0.002, 0.00356, 0.02], instead=True)
     assert wide is not None
     assert wide.scan == [0.0002, 0.0004, 0.0005, 0.00112, 0.002, 0.004, 0.02]
+    nodes = {"node": Computer(tasks={"comms": Task(period=0.004, execution=1e-4)})}
+    beside = commensurate(
+        lambda x: dataclasses.replace(two(x, 0.00025), computers=nodes), [0.00115, 0.00123, 0.0013], instead=True
+    )
+    assert beside is not None
+    assert (beside.scan, beside.moved) == ([0.00115, 0.00125, 0.0013], 1), "at one phase of one, not 1.2 ms"
     assert rates.meetings.between(0.00094, 0.00099) == [0.00095, 0.00096]
     assert rates.meetings.between(0.0041, 0.0044) == [0.0041, 0.004125, 0.0042, 0.00425, 0.0043, 0.004375, 0.0044]
     assert all(hyperperiod_of(two(value)) is not None for value in rates.meetings.between(0.0002, 0.03))
