@@ -1,7 +1,7 @@
 """Local limits of systems with computers or networks, by exact radii at values at which their schedule repeats."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from orchestration.components.fmi.read_description import Model
@@ -81,10 +81,11 @@ def by_examined(radius: Callable[[float], float], span: Range) -> LinearLimit | 
         """Until what is just before the good end is good, too: one of a short hyperperiod may be stable by itself."""
         if bracket is None or bracket.good is None:
             return bracket
-        begin, (good, bad) = bracket.good, bisected(bracket.good, bracket.bad)
-        while abs(good - begin) > (width := WIDTH * span.tolerance_at(bad)):
-            width = math.copysign(width, good - begin)
-            before = next((one for one in _between(good - 1.5 * width, good - 0.5 * width) if is_known(one)), None)
+        begin = min(tried) if own is None else own
+        good, bad = bisected(bracket.good, bracket.bad)
+        while True:
+            near = _before(good, begin, WIDTH * span.tolerance_at(bad))
+            before = next((one for one in near if is_known(one)), None)
             if before is None or not grows(before):
                 break
             within = [one for one in tried if not grows(one) and min(begin, before) <= one <= max(begin, before)]
@@ -123,6 +124,14 @@ def _between(good: float, bad: float) -> list[float]:
     return [*dict.fromkeys(value for value in rounded if abs(value - middle) <= quarter)]
 
 
+def _before(good: float, begin: float, width: float) -> Iterator[float]:
+    """Values between `begin` and a good one, from a width before it on by doubled distances."""
+    while width < abs(good - begin):
+        away = math.copysign(width, begin - good)
+        yield from _between(good + 0.5 * away, good + 1.5 * away)
+        width *= 2.0
+
+
 def _middle(bracket: Bracket | None) -> float | None:
     return None if bracket is None or bracket.good is None else 0.5 * (bracket.good + bracket.bad)
 
@@ -134,5 +143,5 @@ def _end_in_words(bracket: Bracket, refused: Mapping[float, str], span: Range) -
     ends = f"small deviations decay at {span.text(good)} and grow at {span.text(bad)}"
     between = any(min(good, bad) < value < max(good, bad) for value in refused)
     if between and abs(bad - good) > WIDTH * span.tolerance_at(bad):
-        ends += ", and between them no value was found that can be examined"
+        ends += ", between which no value was found that can be examined"
     return f"{ends}, of values at which the schedule repeats soon: others may differ"

@@ -39,7 +39,7 @@ def test_where_nothing_between_can_be_examined_the_bracket_is_the_accuracy() -> 
     found = by_examined(coarse, Range(**{**vars(SPAN), "own": 0.005}))
     assert found is not None
     assert (found.limit, found.accuracy) == pytest.approx((0.0075, 0.0005))
-    assert "decay at 7 ms and grow at 8 ms, and between them no value was found that can be examined" in found.reason
+    assert "decay at 7 ms and grow at 8 ms, between which no value was found that can be examined" in found.reason
 
 
 def test_without_a_value_that_can_be_examined_there_is_no_answer() -> None:
@@ -47,3 +47,9 @@ def test_without_a_value_that_can_be_examined_there_is_no_answer() -> None:
         raise UsageError("too long")
 
     assert by_examined(never, SPAN) is None
+
+
+def test_before_a_value_that_is_stable_by_itself_the_first_that_can_be_examined_counts() -> None:
+    found = by_examined(radius, Range(**{**vars(SPAN), "tolerance": 2e-5, "own": 0.005, "also": (0.00775,)}))
+    assert found is not None
+    assert found.limit == pytest.approx(0.007705, abs=5e-6)
