@@ -104,10 +104,11 @@ def commensurate(
 ) -> Commensurate | None:
     """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period.
 
-    `instead`: one in the place of each value, and no multiples of the others between them; others are then also the
-    periods of what shares a processor or a network.
+    `instead`: one in the place of each value, and no multiples of the others between them; of what shares a
+    processor or a network others are then all that does.
     """
-    beside = beside_others(at, values[0], values[-1], _with_shared if instead else periods_of)
+    is_shared = instead and instants(at(values[0])) != instants(at(values[-1]))
+    beside = beside_others(at, values[0], values[-1], _with_shared if is_shared else periods_of)
     if beside is None:
         return None
     others, unit = beside

@@ -157,12 +157,27 @@ def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None
     wide = commensurate(two, [0.0002, 0.000356, 0.000632, 0.00112, 0.002, 0.00356, 0.02], instead=True)
     assert wide is not None
     assert wide.scan == [0.0002, 0.0004, 0.0005, 0.00112, 0.002, 0.004, 0.02]
-    nodes = {"node": Computer(tasks={"comms": Task(period=0.004, execution=1e-4)})}
-    beside = commensurate(
-        lambda x: dataclasses.replace(two(x, 0.00025), computers=nodes), [0.00115, 0.00123, 0.0013], instead=True
-    )
+
+    def shared(period: float) -> System:
+        tasks = {
+            name: Task(component=name, period=x, execution=1e-5, priority=k)
+            for k, (name, x) in enumerate({"law": period, "servo": 0.00025}.items())
+        }
+        node = Computer(tasks={**tasks, "comms": Task(period=0.004, execution=1e-4, priority=2)})
+        system = two(period, 0.00025)
+        alone = {name: dataclasses.replace(one, sampling=None) for name, one in system.components.items()}
+        return dataclasses.replace(system, components=alone, computers={"node": node})
+
+    beside = commensurate(shared, [0.00115, 0.00123, 0.0013, 0.0040007, 0.0041], instead=True)
     assert beside is not None
-    assert (beside.scan, beside.moved) == ([0.00115, 0.00125, 0.0013], 1), "at one phase of one, not 1.2 ms"
+    assert (beside.scan, beside.moved) == ([0.00115, 0.00125, 0.0013, 0.004, 0.0041], 2), "1.2 ms has more phases"
+    apart = {"node": Computer(tasks={"comms": Task(period=0.004, execution=1e-4)})}
+    alone_on_node = commensurate(
+        lambda x: changed(shared(x), {"computers.node.tasks.servo.period": x}), [0.003, 0.0040007, 0.005], instead=True
+    )
+    assert alone_on_node is not None
+    assert alone_on_node.scan == [0.003, 0.004, 0.005], "as a task without a component shares it, too"
+    assert commensurate(lambda x: dataclasses.replace(two(x, x), computers=apart), [0.003, 0.005], instead=True) is None
     assert rates.meetings.between(0.00094, 0.00099) == [0.00095, 0.00096]
     assert rates.meetings.between(0.0041, 0.0044) == [0.0041, 0.004125, 0.0042, 0.00425, 0.0043, 0.004375, 0.0044]
     assert all(hyperperiod_of(two(value)) is not None for value in rates.meetings.between(0.0002, 0.03))
