@@ -123,7 +123,7 @@ def commensurate(
             value: hyperperiod_of(system)
             for value in sorted(some)
             for system in [at(value)]
-            if not instead or _is_scheduled(system)
+            if not is_shared or _is_scheduled(system)
         }
         return {value: period for value, period in each.items() if period is not None}
 
