@@ -35,7 +35,7 @@ class CommandResult:
     good: bool = True
     """false: exit code 1"""
     afterwards: Callable[[], None] | None = None
-    """What is left to be said, and takes long, when the result is printed"""
+    """the rest of the answer, which takes long, once the result is printed"""
 
     @property
     def as_json(self) -> str:

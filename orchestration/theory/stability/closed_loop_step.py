@@ -59,7 +59,7 @@ class StepResponse:
     steady_state: float
     """The final value; 0: it is less than a millionth of the largest."""
     remaining_error: float | None
-    """1 less the final value, of an input in the unit of the output that moves it its own way; None: of any other."""
+    """One less the final value, of an input in the unit of the output that moves it its own way; None: of any other."""
     peak: float
     """The value that is farthest from 0."""
     peak_time: float
