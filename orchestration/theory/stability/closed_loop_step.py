@@ -27,7 +27,7 @@ from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linearise import NEAR_ONE, in_isolation
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, whole_at_rest
 from orchestration.theory.stability.period_map import StepMap, step_map
-from orchestration.theory.stability.step_response import SETTLED, periods_until_left, sizes_of
+from orchestration.theory.stability.step_response import SETTLED, StepSizes, periods_until_left, sizes_of
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.style import Figures
@@ -39,7 +39,7 @@ WITHIN = f"within {100.0 * SETTLED:.0f} %"
 
 @passable
 @dataclass(frozen=True, kw_only=True)
-class StepResponse:
+class StepResponse(StepSizes):
     """The deviation of an output from rest after a step of 1 of an input, the loop closed."""
 
     input: str
@@ -50,14 +50,6 @@ class StepResponse:
     """The output, as COMPONENT.VARIABLE."""
     unit: str | None
     """Its unit, as its FMU declares it."""
-    rise_time: float | None
-    """The time from 10 to 90 % of the final value [s]; None: the final value is 0."""
-    overshoot: float | None
-    """Excess over the final value, as a share of it [%]; None: the final value is 0."""
-    settling_time: float
-    """The time from which on it stays within 2 % of the final value, or of the largest where that is 0 [s]."""
-    steady_state: float
-    """The final value; 0: it is less than a millionth of the largest."""
     remaining_error: float | None
     """One less the final value, of an input in the unit of the output that moves it its own way; None: of any other."""
     peak: float
@@ -141,7 +133,7 @@ def _found(request: Request, asked: tuple[str, str]) -> StepResponse:
     units = {end: column_infos(system, models, [end])[end].unit for end in (inputs[0], of)}
     error = 1.0 - sizes.steady_state if sizes.steady_state > 0.0 and units[inputs[0]] == units[of] else None
     return StepResponse(
-        input=to, input_unit=units[inputs[0]], output=of, unit=units[of], **sizes._asdict(),
+        input=to, input_unit=units[inputs[0]], output=of, unit=units[of], **vars(sizes),
         remaining_error=0.0 if error is not None and abs(error) < NOTHING else error,
         peak=float(response[farthest]), peak_time=float(times[farthest]), times=times, response=response,
         is_held=system.components[component_of(of)].sampling is not None, in_double=in_double,

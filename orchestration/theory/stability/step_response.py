@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -34,15 +34,9 @@ NO_VALUE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopStep:
-    """The response of one command's loop to a step of 1 that is added to the command."""
+class StepSizes:
+    """The sizes of a response to a step."""
 
-    input: str
-    """The inputs that the command goes to, as COMPONENT.VARIABLE."""
-    output: str
-    """The command, as COMPONENT.VARIABLE."""
-    unit: str | None
-    """Its unit, as its FMU declares it."""
     rise_time: float | None
     """The time from 10 to 90 % of the final value [s]; None: the final value is 0."""
     overshoot: float | None
@@ -50,7 +44,19 @@ class LoopStep:
     settling_time: float
     """The time from which on it stays within 2 % of the final value, or of the largest where that is 0 [s]."""
     steady_state: float
-    """The final value: 1 if the loop takes back all of it."""
+    """The final value; 0: it is less than a share of the largest that may be an error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopStep(StepSizes):
+    """The response of one command's loop to a step of 1 that is added to it; 1 in the end if all is taken back."""
+
+    input: str
+    """The inputs that the command goes to, as COMPONENT.VARIABLE."""
+    output: str
+    """The command, as COMPONENT.VARIABLE."""
+    unit: str | None
+    """Its unit, as its FMU declares it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,15 +160,6 @@ def periods_until_left(radius: float, states: int, samples: int) -> int:
     return count
 
 
-class StepSizes(NamedTuple):
-    """The sizes of a response, as of `LoopStep`."""
-
-    rise_time: float | None
-    overshoot: float | None
-    settling_time: float
-    steady_state: float
-
-
 def sizes_of(times: Floats, response: Floats, final: float, *, has_value: bool) -> StepSizes:
     """The sizes of a response whose final value is not 0 if it `has_value`."""
     largest = float(np.abs(response).max(initial=0.0))
@@ -184,5 +181,5 @@ def _figures(loop: Linearised, request: RequestLike, i: int, times: Floats, resp
         input=receivers_of(request, output),
         output=output,
         unit=column_infos(system, files_of(system).models_of(system), [output])[output].unit,
-        **sizes_of(times, response, final, has_value=has_value)._asdict(),
+        **vars(sizes_of(times, response, final, has_value=has_value)),
     )
