@@ -18,7 +18,7 @@ from orchestration.experiments.comparison.cells import CellSummary, Median
 from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.studies.axes import Value
-from orchestration.experiments.studies.cell_figures import HALF, OF_ALL, letters_of, write_counts
+from orchestration.experiments.studies.cell_texts import HALF, OF_ALL, letters_of, write_counts
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.figures import cells
 from orchestration.simulation.figures.lines import abreast, plain

@@ -17,7 +17,7 @@ from orchestration.experiments.comparison.fronts import Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.comparison.outcome import Outcome
 from orchestration.experiments.studies.axes import Axis, quantity_of
-from orchestration.experiments.studies.cell_figures import cell_maps
+from orchestration.experiments.studies.cell_maps import cell_maps
 from orchestration.experiments.studies.figures import save
 from orchestration.experiments.studies.shares import GOOD
 from orchestration.foundation.basics.simulator import Integers

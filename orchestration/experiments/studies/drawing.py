@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from fmu_kit.new_files import new_files
 from orchestration.experiments.studies import figures, sensitivity
 from orchestration.experiments.studies.axes import Axis, Value, picked, place_of, unit_points
-from orchestration.experiments.studies.cell_figures import MAX_PANELS, cell_lines, cell_maps
+from orchestration.experiments.studies.cell_lines import cell_lines
+from orchestration.experiments.studies.cell_maps import MAX_PANELS, cell_maps
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.figures import heat_map
 from orchestration.experiments.studies.infinite_means import InfiniteMeans

@@ -17,8 +17,9 @@ from matplotlib.text import Text
 import quadcosim
 from orchestration.command import study_table
 from orchestration.command.printed_tables import MAX_ROWS, PrintedTable, decimals_of, lines, to_digits, with_interval
-from orchestration.experiments.studies import cell_figures, drawing
-from orchestration.experiments.studies.cell_figures import cell_lines, cell_maps
+from orchestration.experiments.studies import cell_texts, drawing
+from orchestration.experiments.studies.cell_lines import cell_lines
+from orchestration.experiments.studies.cell_maps import cell_maps
 from orchestration.experiments.studies.shares import (
     PAIR,
     WITHOUT,
@@ -327,7 +328,7 @@ def test_cells_without_a_pair_of_good_runs_are_hatched_in_the_difference_of_medi
 def test_a_map_without_room_for_how_many_of_all_runs_are_good_has_the_good_ones_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(cell_figures, "MAX_LETTERS", 2 * 2 * 3)
+    monkeypatch.setattr(cell_texts, "MAX_LETTERS", 2 * 2 * 3)
     figure = cell_maps(runs(), (PERIODS, LOSSES), LAWS, "good", WORDS, units={})
     assert [text.get_text() for text in figure.axes[1].texts] == ["0", "3", "6", "0", "0", "0"]
     assert figure.axes[3].get_xlabel() == "share of settled runs, and their number"

@@ -1,7 +1,7 @@
-"""Figures of cells: shares of good runs with their intervals, medians or means, and the difference between two laws."""
+"""Maps over two axes of cells: shares of good runs, medians or means, and the difference between two laws."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,22 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from orchestration.experiments.studies.axes import SCALES, Axis, name_of, names_of, quantity_of
-from orchestration.experiments.studies.figures import make_room, mark_edge
+from orchestration.experiments.studies.axes import SCALES, Axis, quantity_of
+from orchestration.experiments.studies.cell_texts import (
+    ALONE,
+    HALF,
+    MARKED,
+    OF_ALL,
+    groups_along,
+    letters_of,
+    names_in,
+    numbers_averaged,
+    repetitions,
+    title_of,
+    write_counts,
+)
 from orchestration.experiments.studies.shares import (
     GOOD,
-    INTERVALS,
     MEAN,
     MEDIAN,
     NO_EXPECTATION,
@@ -31,8 +42,7 @@ from orchestration.experiments.studies.shares import (
 )
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures import cells as mesh
-from orchestration.simulation.figures.lines import abreast
-from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS, NOT_GOOD
+from orchestration.simulation.figures.palette import BLACK, NOT_GOOD
 from orchestration.simulation.figures.shades import inner
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -41,123 +51,12 @@ from orchestration.simulation.results.quantities import Quantity
 if TYPE_CHECKING:
     import pandas as pd
 
-HALF = 0.5
-"""Share at which a map has its line"""
-MAX_LETTERS = 120
-"""Most letters of a row of cells, over all panels, with a space after each: more do not fit into a figure"""
 MAX_TICKS = 12
 """Most ticks beside a panel"""
 MAX_PANELS = 9
 """Most values of a third axis of numbers: a map for each, three in a row"""
-ROW = 0.05
-"""Share of the height of a panel that a row of numbers takes"""
 BESIDE = 4.5
 """Distance [pt] of a number, and of a sign with one, from the middle of a cell with a dot"""
-_NO_VALUE, _SOME = "no value", "some runs left out"
-INFINITY: Any = {"marker": r"$\infty$", "markersize": 7.0, "markeredgewidth": 0.0}
-"""Mark of a mean without a finite expectation"""
-HOLLOW: Any = {"markersize": 3.5, "markerfacecolor": "white", "zorder": 3}
-OF_ALL, ALONE, MARKED = "{}/{}", "{}", "{}  •  −"
-"""Texts of the number of good runs in a cell, of all or, where there is less room, alone; of pairs, with their marks"""
-
-
-def cell_lines(
-    table: "pd.DataFrame",
-    axis: Axis,
-    laws: Axis | None,
-    metric: str,
-    words: tuple[str, str],
-    *,
-    units: Mapping[str, str],
-    average: str = MEDIAN,
-    style: Style = SCREEN,
-) -> Figure:
-    """The share of good runs, or the median or mean of a metric, with its interval at 95 %, over one axis.
-
-    `laws` is an axis of names, such as controllers: a line for each. A mark is hollow where some runs are left out;
-    crosses at the lower edge are values without an average, and signs of infinity at the upper one means without a
-    finite expectation, which are not drawn. The numbers of runs averaged stand at the upper edge, in a
-    row for each line, where there is room.
-    """
-    across = quantity_of(axis, units)
-    figure = style.figure(32.0)
-    panel = figure.add_subplot()
-    names = _names(axis, laws)
-    found = shares_of(table if average == MEDIAN else judged_by(table, metric), names)
-    shown = found if metric == GOOD else averages_of(table, names, metric, average)
-    column = "share" if metric == GOOD else average
-    groups = _by_value(shown, laws, units)
-    lacking: dict[str | tuple[float, ...], Floats] = {}
-    without: dict[str | tuple[float, ...], Floats] = {}
-    lacks, numbers, hollow = [], {}, False
-    for i, (law, group) in enumerate(groups):
-        how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
-        at = across.of(group[axis.name])
-        if REMARK in group and (infinite := group[REMARK] == NO_EXPECTATION).any():
-            without[how["color"]] = at[infinite]
-            group = group.assign(**{column: group[column].mask(infinite)})
-        panel.plot(at, group[column], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
-        if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
-            ends = np.abs(group[["low", "high"]].to_numpy().T - group[column].to_numpy())
-            panel.errorbar(at, group[column], ends, fmt="none", ecolor=how["color"], elinewidth=0.8, capsize=2.5)
-            some = group[group[WITH_VALUE].between(1, group["count"] - 1)]
-            hollow |= len(some) > 0
-            panel.plot(across.of(some[axis.name]), some[column], MARKS[i % len(MARKS)], color=how["color"], **HOLLOW)
-            valued = group[group[WITH_VALUE] > 0]
-            numbers[how["color"]] = [*zip(across.of(valued[axis.name]), _numbers(valued, valued["count"]))]
-            if len(valueless := group.loc[group[WITH_VALUE] == 0, axis.name]):
-                lacking[how["color"]] = across.of(valueless)
-                lacks.append(f"{f'by {law} ' if law else ''}at {', '.join(map(across.text_of, valueless))}")
-        else:
-            panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
-    most = max((len(count) for row in numbers.values() for _, count in row), default=0)
-    numbered = bool(most) and (most + 1) * found[axis.name].nunique() <= letters_of(style, 1)
-    panel.set(
-        xlabel=across.title,
-        ylabel=_title(metric, words, units, average, numbered=numbered, repeats=True),
-        xscale=SCALES[axis.scale],
-    )
-    if metric == GOOD:
-        panel.set_ylim(-0.02, 1.02)
-    taken = _write_rows(panel, numbers) if numbered else 0.0
-    if without:
-        mark_edge(panel, without, beside=taken, **INFINITY)
-        panel.plot([], [], linestyle="", **INFINITY, color=BLACK if laws else BLUE, label=NO_EXPECTATION)
-    if lacking:
-        mark_edge(panel, lacking, marker="x", low=True)
-        panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
-    if hollow:
-        panel.plot([], [], "o", color=BLACK if laws else BLUE, label=_SOME, **HOLLOW)
-    if laws is not None or without or lacking or hollow:
-        names = [law for law, _ in groups]
-        names += [NO_EXPECTATION] * bool(without) + [_NO_VALUE] * bool(lacking) + [_SOME] * bool(hollow)
-        title = None if laws is None else name_of(laws)
-        figure.legend(loc="outside lower center", title=title, ncols=abreast(names, style))
-    said = [_repetitions(found, metric)]
-    if metric != GOOD:
-        said += [f"bars: 95 % intervals {INTERVALS[average]}, where runs suffice"] if said[0] else []
-        said.append(left_out(shown, words[0]))
-    good = "" if average == MEAN else f"{words[0]} "
-    said += [f"crosses: no {good}run with a value {' and '.join(lacks)}"] if lacks else []
-    style.set_title(figure, "; ".join(filter(None, said)))
-    return figure
-
-
-def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, str]]]) -> float:
-    """Write numbers at their places along the upper edge, a row for each colour, above all marks.
-
-    Returns the share of the height that they take.
-    """
-    step = min(ROW, 0.4 / len(numbers))
-    taken = step * (len(numbers) + 0.5)
-    make_room(panel, taken)
-    for row, (color, counts) in enumerate(numbers.items()):
-        for at, count in counts:
-            panel.text(
-                at, 1.0 - (row + 0.5) * step, count, color=color, ha="center", va="center", fontsize="x-small",
-                transform=panel.get_xaxis_transform(),
-            )  # fmt: skip
-    return taken
 
 
 def cell_maps(
@@ -180,7 +79,7 @@ def cell_maps(
     """
     x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
     places = (x.edges, y.edges)
-    names = _names(*axes, third)
+    names = names_in(*axes, third)
     found = shares_of(table if average == MEDIAN else judged_by(table, metric), names)
     found["value"], absent = found["share"], ""
     if metric != GOOD:
@@ -189,7 +88,7 @@ def cell_maps(
         absent = left_out(averages, words[0])
     found["without"] = averages[REMARK].eq(NO_EXPECTATION) if average == MEAN else False
     found["value"] = found["value"].mask(found["without"])
-    groups = _by_value(found, third, units)
+    groups = groups_along(found, third, units)
     both = _two_laws(third)
     count = len(groups) + (both is not None)
     columns = min(count, 3 if style.is_wide else 1 if count <= 3 else 2)
@@ -214,15 +113,15 @@ def cell_maps(
             at, up = (quantity.of(group[axis.name]) for quantity, axis in zip((x, y), axes))
             write_counts(panel, at, up, group["good"], group["count"], OF_ALL if has_room[OF_ALL] else ALONE)
         elif writes and repeats:
-            valued = group[group[WITH_VALUE] > 0].set_index(_names(*axes))
-            texts = _numbers(valued, valued["of" if has_room[OF_ALL] else WITH_VALUE])
+            valued = group[group[WITH_VALUE] > 0].set_index(names_in(*axes))
+            texts = numbers_averaged(valued, valued["of" if has_room[OF_ALL] else WITH_VALUE])
             _write_numbers(panel, (x, y), axes, texts, 0.0)
         panel.set_title(law or "")
     empty = [np.where(np.isnan(grid["value"]) & (grid["without"] == 0.0), 0.0, np.nan) for grid in grids]
     for panel, none_good in zip(panels, empty):
         mesh.fill_kinds(panel, *places, none_good, (NOT_GOOD,))
     numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
-    title = _title(metric, words, units, average, numbered=numbered, repeats=repeats)
+    title = title_of(metric, words, units, average, numbered=numbered, repeats=repeats)
     if found["without"].any():
         title += f",\n{found['without'].sum()} cells without a finite expectation left out"
     mesh.color_bar(panels[: len(groups)].tolist(), filled, everything, title, location="bottom", aspect=40.0)
@@ -248,7 +147,7 @@ def cell_maps(
         panel.set_ylabel(y.title)
     excludes = "Newcombe's for pairs" if metric == GOOD else f"the 95 % interval of the {average} of pairs"
     said = [
-        _repetitions(found, metric),
+        repetitions(found, metric),
         f"+ and −: sign of the difference; dots: {excludes} excludes 0" if both is not None else "",
         absent,
     ]
@@ -294,21 +193,6 @@ class _Cells:
         return places, [f"{self.shown[i]:g}" for i in places]
 
 
-def _names(*axes: Axis | None) -> list[str]:
-    return [axis.name for axis in axes if axis is not None]
-
-
-def _by_value(table: "pd.DataFrame", axis: Axis | None, units: Mapping[str, str]) -> "list[tuple[str, pd.DataFrame]]":
-    """The cells of each value of an axis, with its name: of laws in their order; without an axis all of them."""
-    if axis is None:
-        return [("", table)]
-    of, values = quantity_of(axis, units), axis.values or ()
-    named = names_of(values)
-    if axis.is_numeric:
-        named = {value: f"{of.name} {of.text_of(float(value))}" for value in sorted(map(float, values))}
-    return [(name, table[table[axis.name] == value]) for value, name in named.items()]
-
-
 def _two_laws(axis: Axis | None) -> TwoLaws | None:
     if axis is None or axis.is_numeric or len(axis.values or ()) != 2:
         return None
@@ -329,26 +213,6 @@ def _limit(panel: Axes, places: tuple[Floats, Floats], share: Floats) -> None:
 def _has_limit(share: Floats) -> bool:
     known = share[~np.isnan(share)]
     return bool((known >= HALF).any() and (known < HALF).any())
-
-
-def letters_of(style: Style, columns: int) -> float:
-    """The letters of numbers in cells that fit side by side into one of several panels abreast."""
-    return MAX_LETTERS * min(1.0, style.width / style.font * SCREEN.font / SCREEN.width) / columns
-
-
-def write_counts(
-    panel: Axes, x: Iterable[float], y: Iterable[float], good: Iterable[int], count: Iterable[int], form: str
-) -> None:
-    """Write into the cells at `x` and `y` how many runs are good, in one of the forms of such texts."""
-    for across, up, some, all_ in zip(x, y, good, count):
-        color = "white" if some < HALF * all_ else BLACK
-        panel.text(across, up, form.format(some, all_), color=color, ha="center", va="center", fontsize="x-small")
-
-
-def _numbers(cells: "pd.DataFrame", of: "pd.Series") -> "pd.Series":
-    """The number of runs averaged, with that of all where they are fewer."""
-    counts = cells[WITH_VALUE].astype(str)
-    return counts.where(cells[WITH_VALUE] == of, counts + "/" + of.astype(str))
 
 
 def _write_numbers(
@@ -404,34 +268,9 @@ def _difference(
                 fontsize="small",
             )  # fmt: skip
     if not is_share and writes:
-        _write_numbers(panel, quantities, axes, found.set_index(_names(*axes))["pairs"], BESIDE)
+        _write_numbers(panel, quantities, axes, found.set_index(names_in(*axes))["pairs"], BESIDE)
     marked = found[marks]
     if len(marked):
         places_of_dots = [quantity.of(marked[axis.name]) for quantity, axis in zip(quantities, axes)]
         panel.plot(*places_of_dots, "o", color=BLACK, markersize=3.5, markeredgecolor="white", markeredgewidth=0.6)
     return bool(unknown.any())
-
-
-def _title(
-    metric: str, words: tuple[str, str], units: Mapping[str, str], average: str, *, numbered: bool, repeats: bool
-) -> str:
-    if metric == GOOD:
-        return f"share of {words[0]} runs" + (", and their number" if numbered else "")
-    named = labels.metric_with_unit(metric, units.get(metric))
-    if not repeats:
-        return named if average == MEAN else f"{named},\nwhere {words[0]}"
-    good = "" if average == MEAN else f"{words[0]} "
-    return f"{average} of {named},\n{'number of' if numbered else 'of the'} {good}runs with a value"
-
-
-def _repetitions(cells: "pd.DataFrame", metric: str) -> str:
-    """The number of runs of a cell, and how wide the intervals of their shares are; empty where none repeats."""
-    counts = cells["count"][cells["low"].notna()]
-    fewest, most = counts.min(), counts.max()
-    if not most > 1:
-        return ""
-    runs = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-    width = (cells["high"] - cells["low"]).max()
-    alike = "; one where nothing is random" if cells["low"].isna().any() else ""
-    known = metric == GOOD and np.isfinite(width)
-    return f"{runs} runs a cell{alike}" + (f"; Wilson intervals at 95 % up to {width:.2f} wide" if known else "")
