@@ -23,10 +23,11 @@ from orchestration.experiments.comparison.cells import FATES, SETTLING, survived
 from orchestration.experiments.comparison.run import rerun_cells
 from orchestration.experiments.limits import figure, limit
 from orchestration.experiments.studies import drawing, figures
+from orchestration.experiments.studies.missing_runs import AGREEMENT
 from orchestration.experiments.studies.store import open_for_reading, store_path
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
-from orchestration.experiments.studies.sweep import AGREEMENT, sweep
+from orchestration.experiments.studies.sweep import sweep
 from orchestration.foundation.basics.statistics import first_end, quantile, wilson
 from orchestration.quadrotor.flight.hover_limit import about_hover, margin_of
 from orchestration.quadrotor.flight.hover_loop import HoverLoop

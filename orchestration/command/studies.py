@@ -63,9 +63,10 @@ def sweep(
 
 def status(study: StudyFile, out: Out = None, store: Annotated[Path | None, STORE] = None) -> CommandResult:
     """Show the progress of a study, also while it runs in another process."""
+    from orchestration.experiments.studies.missing_runs import AGREEMENT, ENGINE
     from orchestration.experiments.studies.store import note_on_engines, open_for_reading, store_folder, store_path
     from orchestration.experiments.studies.study_file import load_study
-    from orchestration.experiments.studies.sweep import AGREEMENT, ENGINE, TOTAL, expect_current
+    from orchestration.experiments.studies.sweep import TOTAL, expect_current
     from orchestration.simulation.results.objectives import how_runs_ended
     from orchestration.simulation.workers.batching import LaneAgreement
 

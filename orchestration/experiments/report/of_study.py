@@ -19,10 +19,11 @@ from orchestration.experiments.report.tracks import Tracks
 from orchestration.experiments.studies.axes import Axis, quantity_of
 from orchestration.experiments.studies.default_metric import default_metric
 from orchestration.experiments.studies.infinite_means import INFINITE, InfiniteMeans
+from orchestration.experiments.studies.missing_runs import AGREEMENT
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.store_columns import GUIDS, TEXTS, UNITS
 from orchestration.experiments.studies.study import Study
-from orchestration.experiments.studies.sweep import AGREEMENT, expect_current
+from orchestration.experiments.studies.sweep import expect_current
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.results import display_names as labels

@@ -2,62 +2,43 @@
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from fmu_kit.new_files import write_atomically
-from orchestration.components.building.fmus import native_twin
 from orchestration.experiments.studies import store
-from orchestration.experiments.studies.checks import Checked, check_design, describe_run
+from orchestration.experiments.studies.checks import Checked, check_design
 from orchestration.experiments.studies.infinite_means import INFINITE, InfiniteMeans
-from orchestration.experiments.studies.lane_agreement import lane_agreement, with_python_twins
-from orchestration.experiments.studies.run_columns import TOGETHER, RunColumns
+from orchestration.experiments.studies.lane_agreement import with_python_twins
+from orchestration.experiments.studies.missing_runs import ENGINE, Announce, Flight, run_missing
+from orchestration.experiments.studies.run_columns import RunColumns
 from orchestration.experiments.studies.run_key import CONTENT, design_parts, difference, place_parts, study_parts
 from orchestration.experiments.studies.store_columns import GUIDS, UNITS
-from orchestration.experiments.studies.study import StartValues, Study
+from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import FileLike, load_study
 from orchestration.experiments.studies.swept import Swept
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
-from orchestration.foundation.basics.simulator import Integers
-from orchestration.foundation.basics.terminal import Count, CountProgress, inform, runs_reporter, warn
-from orchestration.simulation.engines.master import Engine
+from orchestration.foundation.basics.terminal import CountProgress, inform, runs_reporter, warn
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
 from orchestration.simulation.runs.result import Result
-from orchestration.simulation.workers.batching import LaneAgreement, Sample, chunks
 from orchestration.simulation.workers.choice import EngineChoice, Execution, choose_execution
 from orchestration.simulation.workers.executors import (
-    TaskRunner,
     cluster,
     expect_scheduler,
     expect_workers,
-    local_workers,
 )
 from orchestration.simulation.workers.pool import Inputs
 from orchestration.simulation.workers.provenance import versions
-from orchestration.simulation.workers.row import Rows
-from orchestration.simulation.workers.task import RunTask, TaskBatch
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 
-Announce = Callable[[str], None]
-"""Called with lines about the engine and failed runs."""
-
 TOTAL, STUDY_PARTS, DESIGN_PARTS, PLACE_PARTS, AXES = "total", "study", "design", "place", "axes"
-ENGINE, AGREEMENT = "engine", "agreement"
-"""Names of entries of a store: the engine used last, and the agreement of runs in lanes with their FMUs; empty: open"""
-_ANNOUNCED = 3
-"""Largest number of failed runs that are announced"""
 
 
 @explains_missing
@@ -94,66 +75,42 @@ def sweep(
     engine of a store; `KeyboardInterrupt`, stating how far it came, after Ctrl-C.
     """
     study = load_study(study)
-    _expect_workers(workers, dask)
-    if time_limit is not None and not time_limit > 0.0:
-        raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
+    _expect_possible(workers, dask, time_limit)
     if metrics is not None:
         study = replace(study, metrics=metrics_from_sources(metrics))
     columns, execution, follows = prepare(study, engine)
-    study, files = columns.study, columns.files
-    path = store.store_path(study.name, out)
-    with store.open_for_writing(path, study.metric_names) as opened, contextlib.ExitStack() as stack:
-        report = stack.enter_context(runs_reporter(progress))
-        _expect_same_study(opened, columns)
-        if engine == "auto":
-            before = opened.about().get(ENGINE, execution.name)
-            execution = execution.as_before(before, str(path), "another one needs another folder, --out")
-        all_files = with_python_twins(files) if execution.in_lanes else files
-        reached = None if dask is None else stack.enter_context(cluster(Inputs.of(all_files), dask))
-        _describe(opened, columns)  # last, so that what is refused changes nothing
-        missing = _missing(opened, study, retry_failed)
-        sweep_progress = _Progress(study, missing, report, announce)
-        sample, agreement = _not_known_to_agree(opened) if execution.in_lanes else Sample(), None
-        if len(missing) or sample.runs:
-            opened.describe({ENGINE: execution.name, AGREEMENT: ""})
-            if announce is not None and engine == "auto":
-                execution.tell(announce)
-            elif announce is not None and (slow := [fmu for fmu in files.fmus if native_twin(fmu) != fmu]):
-                announce(
-                    f"engine {execution.name}: slow, as {', '.join(slow)} run{'s' if len(slow) == 1 else ''} Python; "
-                    "--engine auto is fast, by native twins, in another folder, --out"
-                )
-            task_of = partial(_task, study, files.start_values, time_limit)
-            chunk, windows = partial(chunks, total=len(missing), workers=workers), _windows(opened, missing[:, 0])
-            tasks: Iterable[RunTask | TaskBatch]
-            if execution.in_lanes:
-                tasks = _in_lanes(columns, windows, partial(task_of, engine=None), time_limit, chunk)
-            else:
-                tasks = (
-                    task_of(i, key, execution.engine) for some, keys in windows for i, key in zip(some.tolist(), keys)
-                )
-            try:
-                with _workers(all_files, workers, reached) as run:
-                    with contextlib.closing(run(tasks)) as results:
-                        for rows in results:
-                            _keep(rows, opened)
-                            sweep_progress.add(rows)
-                            sample.add(rows)
-                    agreement = lane_agreement(sample, all_files, partial(task_of, engine=None), run, here=dask is None)
-            except KeyboardInterrupt:
-                raise Interrupted(f"with {sweep_progress.done} of {sweep_progress.total} runs done") from None
-        if agreement is not None:
-            opened.describe({AGREEMENT: agreement.as_text()})
-            agreement.expect()
-        stack.close()  # nothing more runs
+    study, path = columns.study, store.store_path(study.name, out)
+    with store.open_for_writing(path, study.metric_names) as opened:
+        with runs_reporter(progress) as report, contextlib.ExitStack() as stack:
+            _expect_same_study(opened, columns)
+            if engine == "auto":
+                before = opened.about().get(ENGINE, execution.name)
+                execution = execution.as_before(before, str(path), "another one needs another folder, --out")
+            files = with_python_twins(columns.files) if execution.in_lanes else columns.files
+            reached = None if dask is None else stack.enter_context(cluster(Inputs.of(files), dask))
+            _describe(opened, columns)  # last, so that what is refused changes nothing
+            flight = Flight(
+                columns=columns, execution=execution, files=files, local=workers, cluster=reached,
+                time_limit=time_limit, chosen=engine == "auto",
+            )  # fmt: skip
+            flown, agreement = run_missing(opened, flight, report, announce, retry_failed=retry_failed)
         infinite = _infinite_means(opened, columns)
         if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
             warn(warning)
         failed, engines = opened.counts().get("failed", 0), opened.engines()
     return Swept(
-        study=study, total=len(study.points), flown=len(missing), failed=failed, path=path, engine=execution.name,
+        study=study, total=len(study.points), flown=flown, failed=failed, path=path, engine=execution.name,
         engines=engines, agreement=agreement, follows=follows, infinite_means=infinite,
     )  # fmt: skip
+
+
+def _expect_possible(workers: int, dask: str | None, time_limit: float | None) -> None:
+    """Raise `UsageError` for workers or a time limit that cannot be."""
+    expect_workers(workers)
+    if dask is not None:
+        expect_scheduler(dask)
+    if time_limit is not None and not time_limit > 0.0:
+        raise UsageError(f"--time-limit {time_limit:g}: expected a positive number of seconds")
 
 
 def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, tuple[str, ...]]:
@@ -180,17 +137,6 @@ def prepare(study: Study, engine: EngineChoice) -> tuple[RunColumns, Execution, 
     return columns, execution, checked.follows
 
 
-def _expect_workers(workers: int, dask: str | None) -> None:
-    expect_workers(workers)
-    if dask is not None:
-        expect_scheduler(dask)
-
-
-def _workers(files: Files, workers: int, reached: TaskRunner | None) -> AbstractContextManager[TaskRunner]:
-    """The workers that run tasks: those of the cluster that was reached, else local ones."""
-    return local_workers(Inputs.of(files), workers) if reached is None else contextlib.nullcontext(reached)
-
-
 def expect_current(opened: store.Store, study: Study) -> None:
     """Raise `UsageError` if `study` is not, or no longer, the one whose rows are in the store."""
     about = opened.about()
@@ -204,103 +150,6 @@ def expect_current(opened: store.Store, study: Study) -> None:
             f"{opened.path}: the study file has changed since ({changes}); expected the study that was run: "
             f"quadcosim sweep {what_runs_it}"
         )
-
-
-class _Progress:
-    """Counts the runs of a sweep, and reports progress and failures."""
-
-    def __init__(self, study: Study, missing: Integers, report: Count, announce: Announce | None) -> None:
-        """`missing` as the store has it."""
-        self.total, self.failed = len(study.points), 0
-        self._study, self._callback, self._announce = study, report, announce
-        self._indices, self._points = missing.T
-        self.done = self.total - int(self._points.sum())
-        self._report()
-
-    def add(self, rows: Rows) -> None:
-        """Count runs that have been written."""
-        for place in np.flatnonzero(rows.results.failed).tolist():
-            self.failed += 1
-            if self._announce is not None and self.failed <= _ANNOUNCED:
-                more = "; further ones are not shown" if self.failed == _ANNOUNCED else ""
-                run = describe_run(rows.index[place], self._study.points[rows.index[place]])
-                self._announce(f"{run} failed: {rows.results.messages[place]}{more}")
-        self.done += int(self._points[np.searchsorted(self._indices, rows.index)].sum())
-        self._report()
-
-    def _report(self) -> None:
-        self._callback(self.done, self.total)
-
-
-def _windows(opened: store.Store, indices: Integers) -> Iterator[tuple[Integers, list[str]]]:
-    """Indices and keys of runs, some thousands at a time."""
-    for first in range(0, len(indices), TOGETHER):
-        some = indices[first : first + TOGETHER]
-        yield some, opened.keys(some)
-
-
-def _in_lanes(
-    columns: RunColumns,
-    windows: Iterable[tuple[Integers, list[str]]],
-    task_of: Callable[[int, str], RunTask],
-    limit: float | None,
-    chunk: Callable[[Iterable[TaskBatch]], Iterator[TaskBatch]],
-) -> Iterator[RunTask | TaskBatch]:
-    """Tasks of many runs, but of one run where signals are kept."""
-    for indices, keys in windows:
-        kept = {index for index in indices.tolist() if columns.study.keeps_signals(index)}
-        yield from (task_of(index, key) for index, key in zip(indices.tolist(), keys) if index in kept)
-        if rest := [place for place, index in enumerate(indices.tolist()) if index not in kept]:
-            yield from chunk([columns.batch(columns.block(indices[rest]), [keys[place] for place in rest], limit)])
-
-
-def _task(
-    study: Study,
-    starts: StartValues,
-    time_limit: float | None,
-    index: int,
-    key: str,
-    engine: Engine | None,
-) -> RunTask:
-    return RunTask(
-        index=index, key=key, system=study.system(index, starts),
-        keep_signals=study.keeps_signals(index), metrics=study.metrics, engine=engine, time_limit=time_limit,
-    )  # fmt: skip
-
-
-def _missing(opened: store.Store, study: Study, retry_failed: bool) -> Integers:
-    """The points of the design to run, as the store has them: without a row, or without the signals to keep."""
-    missing = opened.missing(failed_too=retry_failed)
-    if not study.keep_signals:
-        return missing
-    without_signals = [
-        (row["design_index"], 0)
-        for row in opened.rows()
-        if study.keeps_signals(row["design_index"])
-        and row["status"] == "done"
-        and not _signals_path(opened, row["key"]).is_file()
-    ]
-    both = np.concatenate([missing, np.array(without_signals, dtype=np.int64).reshape(-1, 2)])
-    return both[np.unique(both[:, 0], return_index=True)[1]]
-
-
-def _not_known_to_agree(opened: store.Store) -> Sample:
-    """A sample of the runs in lanes of a store; empty where runs have agreed, with none added since."""
-    sample, before = Sample(), opened.about().get(AGREEMENT)
-    if not before or not LaneAgreement.from_text(before).agrees:
-        sample.add_stored(opened.rows(), opened.metrics)
-    return sample
-
-
-def _signals_path(opened: store.Store, key: str) -> Path:
-    return opened.path.parent / "signals" / f"{key[:16]}.parquet"
-
-
-def _keep(rows: Rows, opened: store.Store) -> None:
-    """Write signals first, then the rows, so that every row has its signals."""
-    for place, signals in rows.results.signals.items():
-        write_atomically(_signals_path(opened, rows.key[place]), signals)
-    opened.add(rows)
 
 
 def _expect_same_study(opened: store.Store, columns: RunColumns) -> None:

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from orchestration.experiments.studies.missing_runs import AGREEMENT
 from orchestration.experiments.studies.store import open_for_reading
 from orchestration.experiments.studies.study import Study
 from orchestration.experiments.studies.study_file import load_study
-from orchestration.experiments.studies.sweep import AGREEMENT
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.processes.child import Died, Ending
@@ -96,7 +96,7 @@ def test_runs_that_are_not_known_to_agree_are_compared_by_the_next_sweep(
             raise KeyboardInterrupt
         return one
 
-    monkeypatch.setattr("orchestration.experiments.studies.sweep.lane_agreement", compared)
+    monkeypatch.setattr("orchestration.experiments.studies.missing_runs.lane_agreement", compared)
     with pytest.raises(Interrupted):
         sweep(some, out=tmp_path, engine="batch")
     with pytest.raises(QuadcosimError, match="in lanes differs"):
