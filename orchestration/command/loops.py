@@ -111,6 +111,8 @@ def step(
         "dt": found.dt,
         **{name: slowest[name] for name in ("rise_time", "overshoot", "settling_time", "steady_state")},
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
+        "times": found.times.tolist(),
+        "responses": found.responses.tolist(),
     }
     lines = list(in_columns(rows, right=True))
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
@@ -122,8 +124,8 @@ def _closed_loop_step(request: "Request", to: str, of: str, out: Path | None) ->
     found = step_response(request, to=to, of=of)
     if out is not None:
         _draw(found.plot(), out, f"{to}_{of}")
-    left_out = ("times", "response", "is_held", "in_double")
-    document = {key: value for key, value in vars(found).items() if key not in left_out}
+    sizes = {key: value for key, value in vars(found).items() if key not in ("is_held", "in_double")}
+    document = {**sizes, "times": found.times.tolist(), "response": found.response.tolist()}
     return CommandResult(document=document, verdict=found.verdict, lines=[])
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.experiments.tuning.tuning_problem import COST, Costs, SearchResult, TuningProblem, minimise
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
@@ -52,7 +52,7 @@ class ExactTuningResult(SearchResult):
     @property
     def judgement(self) -> str:
         """The margin to an infinite cost, in words, and what makes the cost doubtful."""
-        radius = f"the mean-square radius is {self.mean_square_radius:.6g}"
+        radius = f"the mean-square radius is {told_apart(self.mean_square_radius, 1.0)[0]}"
         return f"{radius}; warning: {self.doubt}" if self.doubt else radius
 
     @property

@@ -137,6 +137,16 @@ def shown(value: object) -> str:
     return text if len(text) <= 100 else f"{text[:99]}…"
 
 
+def told_apart(value: float, bound: float, digits: int = 6) -> tuple[str, str]:
+    """A value and its bound as texts, with as many digits as it takes for the texts to compare as the numbers do."""
+    for count in range(digits, 18):
+        texts = f"{value:.{count}g}", f"{bound:.{max(count, 6)}g}"
+        seen, limit = map(float, texts)
+        if (seen < limit, seen > limit) == (value < bound, value > bound):
+            break
+    return texts
+
+
 Wording = Callable[[str], str]
 _wording: Wording = str
 """Translates the text of errors, which is written in terms of the command line"""

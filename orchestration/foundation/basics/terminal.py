@@ -6,6 +6,7 @@ import logging
 import math
 import os
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -20,6 +21,8 @@ Count = Callable[[int, int], None]
 
 SPARSE = 10.0
 """Time between two progress lines where no bar can be drawn [s]"""
+SILENCE = 30.0
+"""Time without a line there, after which one says that the work goes on [s]"""
 
 
 class _Screen(logging.Handler):
@@ -65,11 +68,11 @@ def inform(text: str) -> None:
 
 
 _BARS: list[Callable[[str], None]] = []
-"""Functions that set the text of the bars that are drawn, the innermost last; an empty one: its own"""
+"""Functions that set the text of the bars, or lines, of progress, the innermost last; an empty one: its own"""
 
 
 def inform_in_passing(text: str) -> None:
-    """Show one line about the progress of work in place of a bar's text, with which it goes; verbose: print it."""
+    """Show one line about the progress of work in the text of a bar, with which it goes; verbose: print it."""
     for bar in _BARS[-1:]:
         bar(text)
     detail(text)
@@ -77,7 +80,7 @@ def inform_in_passing(text: str) -> None:
 
 @contextmanager
 def stated_beside_bar(text: str) -> Iterator[None]:
-    """Text of the innermost bar that is drawn, while the block runs; nothing without one."""
+    """Text of the innermost bar, or line of progress, while the block runs; nothing without one."""
     for bar in _BARS[-1:]:
         bar(text)
     yield
@@ -124,8 +127,9 @@ def _painted(record: logging.LogRecord) -> str:
 def progress_bar(what: str, *, steady: bool = True) -> Iterator[Share]:
     """A progress bar on a terminal that can draw it; else occasional lines. `steady`: the rate tells the time left."""
     if not _draws():
-        report, left = _occasional_lines(), _TimeLeft()
-        yield lambda share: report(f"{what}: {share:.0%}", left.after(share) if steady else "")
+        left = _TimeLeft()
+        with _occasional_lines(what) as report:
+            yield lambda share: report(f"{what}: {share:.0%}", left.after(share) if steady else "")
         return
     from rich.progress import Progress
 
@@ -143,8 +147,9 @@ def progress_bar(what: str, *, steady: bool = True) -> Iterator[Share]:
 def runs_bar() -> Iterator[Count]:
     """A progress bar with rate and time left on a terminal that can draw it; else occasional lines."""
     if not _draws():
-        report, left = _occasional_lines(), _TimeLeft()
-        yield lambda done, total: report(f"{done} of {total} runs", left.after(done / max(total, 1)))
+        left = _TimeLeft()
+        with _occasional_lines("runs") as report:
+            yield lambda done, total: report(f"{done} of {total} runs", left.after(done / max(total, 1)))
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -162,18 +167,46 @@ def runs_bar() -> Iterator[Count]:
         yield update
 
 
-def _occasional_lines() -> Callable[[str, str], None]:
-    """Prints its argument, but not within `SPARSE` seconds of the start or of the last line."""
-    last = time.monotonic()
+@contextmanager
+def _occasional_lines(what: str) -> Iterator[Callable[[str, str], None]]:
+    """Prints its argument, but not within `SPARSE` seconds of the start or of the last line.
 
-    def report(text: str, left: str) -> None:
+    Where it is not called, or in vain, a thread repeats it after `SILENCE` seconds with how long the work has taken.
+    """
+    began = last = time.monotonic()
+    told, details, over, lock = what, "", threading.Event(), threading.Lock()
+
+    def show(line: str, silence: float) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last >= SPARSE:
+        if now - last >= silence:
             last = now
-            inform(f"{text}{left}")
+            inform(line)
 
-    return report
+    def report(text: str, left: str) -> None:
+        nonlocal told
+        with lock:
+            told = text
+            show(f"{text}{left}", SPARSE)
+
+    def detailed(text: str) -> None:
+        nonlocal details
+        details = text and f", {text}"
+
+    def go_on() -> None:
+        while not over.wait(max(0.0, last + SILENCE - time.monotonic())):
+            with lock:
+                show(f"{told}{details}, {_duration(time.monotonic() - began)} so far", SILENCE)
+
+    thread = threading.Thread(target=go_on, name="progress", daemon=True)
+    thread.start()
+    _BARS.append(detailed)
+    try:
+        yield report
+    finally:
+        _BARS.pop()
+        over.set()
+        thread.join()
 
 
 class _TimeLeft:

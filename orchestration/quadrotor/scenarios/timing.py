@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.documents import read_toml
-from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.errors import UsageError, expected_name, shown
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import is_at_least
 from orchestration.systems.system import distribution
@@ -90,7 +90,7 @@ class Timing:
         longest = self.period / self.clock_ratio
         if not distribution.reads_file(self.jitter):
             most = distribution.highest(self.jitter)
-            require(most < longest, f"{_PLACE}jitter", most, f"less than the period of {longest:g} s")
+            require(most < longest, f"{_PLACE}jitter", most, f"less than the period of {shown(longest)} s")
         if self.clock == "fmu":
             require_own_clock(self, _PLACE)
 

@@ -16,7 +16,7 @@ from orchestration.systems.signals.table_file import header_of
 from orchestration.systems.system.connection import Source
 from orchestration.systems.system.file import load_system
 from orchestration.systems.system.model import System
-from orchestration.systems.system.paths import TOP
+from orchestration.systems.system.paths import AT_REST, TOP
 from orchestration.systems.system.requirements import is_finite, require
 
 Between = Literal["linear", "previous"]
@@ -164,7 +164,7 @@ def paths_of(target: str) -> tuple[str, ...]:
     """
     table, _, key = target.partition(".")
     kind, _, measurement = key.partition(".")
-    if target in TOP or table in ("components", "connections", "sources"):
+    if target in TOP or table in ("components", "connections", "sources", AT_REST):
         return (target,)
     if table == "timing" and key == "loss":
         return (*TIMING["measurement_loss"], *TIMING["command_loss"])

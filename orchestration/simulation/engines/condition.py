@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from orchestration.foundation.basics.c_structures import constants
-from orchestration.foundation.basics.errors import prefixed
+from orchestration.foundation.basics.errors import prefixed, told_apart
 from orchestration.simulation.engines.sources import SourceValues
 from orchestration.simulation.engines.wiring_by_index import Board
 from orchestration.systems.expressions.at_instant import Current, compiled, scalars
@@ -128,8 +128,9 @@ class _Clause:
         if self._left is None or not isinstance(node, Operation):
             return f"{text(node)} at t = {t:g} s"
         left, right = node.operands
-        expected = _EXPECTED[node.sign]
-        return f"{text(left)} = {self._left(values):g} at t = {t:g} s, expected {expected} {text(right)}"
+        value = self._left(values)
+        shown = told_apart(value, right.value)[0] if isinstance(right, Number) else f"{value:g}"
+        return f"{text(left)} = {shown} at t = {t:g} s, expected {_EXPECTED[node.sign]} {text(right)}"
 
 
 @functools.lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ from orchestration.components.fmi.access import SCHEDULED
 from orchestration.components.fmi.instance import number_of
 from orchestration.components.fmi.kit import SAMPLE_OFFSET, SAMPLE_PERIOD, TRAJECTORY
 from orchestration.components.fmi.read_description import NUMERIC, DeclaredClock, Model, called, read_model
-from orchestration.foundation.basics.errors import UsageError, prefixed
+from orchestration.foundation.basics.errors import UsageError, prefixed, told_apart
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import Grid, exact_nanoseconds
 from orchestration.foundation.basics.unit_algebra import quantity
@@ -211,9 +211,8 @@ def _expect_ticks(name: str, sampling: Sampling | None, clock: DeclaredClock) ->
             ("offset", sampling.offset, clock.shift),
         ):
             if fixed is not None and value != float(fixed):
-                raise UsageError(
-                    f"{place}.{key} = {value:g}: expected {float(fixed):g}, that of the constant {clock.name}"
-                )
+                given, expected = told_apart(value, float(fixed))
+                raise UsageError(f"{place}.{key} = {given}: expected {expected}, that of the constant {clock.name}")
 
 
 def numeric_parameters(system: System, models: Mapping[str, Model]) -> dict[str, float]:

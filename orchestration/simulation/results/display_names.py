@@ -113,10 +113,10 @@ def unit(text: str | None) -> str | None:
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def amount(value: float, of: str | None) -> str:
-    """A number with its unit, to three digits."""
+def amount(value: float, of: str | None, digits: int = 3) -> str:
+    """A number with its unit, to so many digits."""
     shown = unit(of)
-    return f"{value:.3g}" if shown is None else f"{value:.3g} {shown}"
+    return f"{value:.{digits}g}" if shown is None else f"{value:.{digits}g} {shown}"
 
 
 def with_unit(name: str, of: str | None) -> str:

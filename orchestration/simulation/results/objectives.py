@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError, shown, told_apart
 from orchestration.foundation.basics.simulator import Booleans, Floats
 from orchestration.foundation.basics.times import instants_of
 from orchestration.foundation.basics.unit_algebra import after
@@ -354,7 +354,7 @@ def _in_words(part: Node, units: Mapping[str, str]) -> str:
     match part:
         case Operation(operation, (Name(name), Number(bound))) if operation in _HOLDS:
             unit = units.get(name) or labels.METRICS.get(name, ("", None))[1]
-            return f"{labels.metric(name)} {operation} {labels.amount(bound, unit)}"
+            return f"{labels.metric(name)} {operation} {labels.amount(bound, unit, 6)}"
         case Operation("or"):
             return f"({text_of(part)})"
     return text_of(part)
@@ -367,6 +367,6 @@ def _missed(part: Node, metrics: Mapping[str, Any], units: Mapping[str, str]) ->
             if value is not None and _HOLDS[operation](value, bound):
                 return None
             unit = after(units.get(name))
-            text = "has no value" if value is None else f"= {value:.4g}{unit}"
-            return f"{name} {text}, expected {operation} {bound:g}{unit}"
+            shown, limit = ("", f"{bound:g}") if value is None else told_apart(value, bound, digits=4)
+            return f"{name} {f'= {shown}{unit}' if shown else 'has no value'}, expected {operation} {limit}{unit}"
     return None

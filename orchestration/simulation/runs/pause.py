@@ -11,7 +11,7 @@ import numpy as np
 from fmu_kit.new_files import clear, new_file, write_atomically
 from orchestration.components.fmi.instance import NO_STATE
 from orchestration.components.fmi.trust import content_hash
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.processes.resource_limits import Limits
 from orchestration.foundation.recording.recording import InMemory, Recorder
@@ -50,7 +50,8 @@ def fly_until(
     loaded = request_of(request)
     stop_time = system_of(loaded).stop_time
     if not 0.0 <= pause_at < stop_time:
-        raise UsageError(f"pause at {pause_at:g} s: expected a time from 0 to before stop_time {stop_time:g} s")
+        given, end = told_apart(pause_at, stop_time)
+        raise UsageError(f"pause at {given} s: expected a time from 0 to before stop_time {end} s")
 
     def simulate_into(recorder: ToFolder) -> Result | None:
         result = simulate(

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import Any, NamedTuple
 
-from orchestration.foundation.basics.errors import QuadcosimError
+from orchestration.foundation.basics.errors import QuadcosimError, told_apart
 from orchestration.foundation.basics.unit_algebra import counted
 from orchestration.simulation.engines.batch.kernels import preferred_lanes
 from orchestration.simulation.engines.batch.shape import outline
@@ -160,9 +160,11 @@ class LaneAgreement:
     def expect(self, by: str = "its FMUs") -> None:
         """Raise `QuadcosimError`, naming run and metric, if the difference exceeds the tolerance."""
         if self.difference > TOLERATED:
+            by_what, most = told_apart(self.difference, TOLERATED, digits=3)
             raise QuadcosimError(
-                f"run {self.index}: {self.metric} in lanes differs by {self.difference:.3g} "
-                f"from that by {by}; expected at most {TOLERATED:g}"
+                f"run {self.index}: {self.metric} in lanes differs by {by_what} from that by {by}; "
+                f"expected at most {most}"
+                f"expected at most {most}"
             )
         if self.python is not None:
             self.python.expect("its FMUs in Python, at the beginning of the run")

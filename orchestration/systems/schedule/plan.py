@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError, prefixed
+from orchestration.foundation.basics.errors import UsageError, prefixed, told_apart
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import Grid, seconds
 from orchestration.systems.system.component import Sampling
@@ -200,7 +200,8 @@ def expect_no_longer(system: System) -> None:
         times |= _times_of_resources(system)
     for place, time in times.items():
         if time >= seconds(MAX_TIME):
-            raise UsageError(f"{place} = {time:g} s: expected less than {seconds(MAX_TIME):.4g} s")
+            given, most = told_apart(time, seconds(MAX_TIME))
+            raise UsageError(f"{place} = {given} s: expected less than {most} s")
     for i, x in enumerate(system.connections):
         sampling = system.components[x.receiver].sampling
         if sampling is None or system.components[x.sender].sampling is not None:

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from orchestration.foundation.basics.documents import readable
-from orchestration.foundation.basics.errors import A_FLOAT, UsageError, shown
+from orchestration.foundation.basics.errors import A_FLOAT, UsageError, shown, told_apart
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS, seconds
 
@@ -72,8 +72,10 @@ def read_table(
     rows.expect_increasing_times(jumps=True)
     time = rows.columns[TIME]
     if not held and (time[0] > begin or time[-1] < begin + stop_time):
-        end = f"{begin + stop_time:g} s" if begin else f"stop_time = {stop_time:g} s"
-        raise UsageError(f"{path}: covers {time[0]:g} to {time[-1]:g} s, expected {begin:g} to {end}")
+        first, start = told_apart(time[0], begin)
+        last, stop = told_apart(time[-1], begin + stop_time)
+        end = stop if begin else f"stop_time = {stop}"
+        raise UsageError(f"{path}: covers {first} to {last} s, expected {start} to {end} s")
     time = time - begin
     if held:
         time = seconds(np.rint(time * NANOSECONDS))  # as the instants of the run: 3 * 0.1 is no time after 0.3

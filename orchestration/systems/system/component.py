@@ -86,7 +86,7 @@ class Sampling:
     def expect_jitter_within_period(self) -> None:
         """Raise `UsageError` for a lateness of a period or more; that of a trace is known when the file is read."""
         longest, most = self.period / self.clock_ratio, highest(self.jitter)
-        require(most < longest, "jitter", most, f"less than the period of {longest:g} s")
+        require(most < longest, "jitter", most, f"less than the period of {shown(longest)} s")
 
 
 @record()

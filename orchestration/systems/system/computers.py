@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
 
+from orchestration.foundation.basics.errors import shown
 from orchestration.foundation.basics.records import record
 from orchestration.foundation.basics.times import NANOSECONDS, is_at_least, nanoseconds, seconds
 from orchestration.systems.system.choices import NetworkKind, Overrun, Read, Scheduling, Stuffing, Write
@@ -260,7 +261,7 @@ def _expect_releases(of: Any, ways: str) -> None:
 
 def require_less(place: str, jitter: Varying, period: float) -> None:
     """Raise `UsageError` for a lateness of a `period` [s] or more."""
-    require(highest(jitter) < period, place, highest(jitter), f"less than the period of {period:g} s")
+    require(highest(jitter) < period, place, highest(jitter), f"less than the period of {shown(period)} s")
 
 
 def _due(of: Any) -> float:

@@ -24,8 +24,8 @@ from orchestration.systems.system.distribution import parsed_fields
 from orchestration.systems.system.model import AFTER, System
 from orchestration.systems.system.placement import SHARED
 
-OF_REST = f"operating_point.{AFTER}"
-TOP = ("stop_time", "seed", OF_REST)
+TOP = ("stop_time", "seed")
+AT_REST = "operating_point"
 _IN_FILE_ONLY = "is set in the file only"
 _COMPONENTS, _PARAMETERS = "components.", ".parameters."
 
@@ -35,19 +35,21 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
 
     Paths are such as `components.tank.step`, `components.controller.sampling.period`, `connections.valve.delay`,
     `components.controller.parameters.maxlevel`, `sources.wind.noise`, `computers.autopilot.tasks.telemetry.execution`,
-    `networks.bus.messages.status.period`, `stop_time`. Where a whole number is expected, 1.0 is 1; where a number may
-    vary, a table or the text of one is its distribution, as `{uniform = [0.001, 0.004]}`.
+    `networks.bus.messages.status.period`, `stop_time`, or `operating_point.` and any of these. Where a whole number is
+    expected, 1.0 is 1; where a number may vary, a table or the text of one is its distribution, as
+    `{uniform = [0.001, 0.004]}`.
 
     Raises `UsageError` for a path that does not exist, naming those that do, or an invalid value.
     """
     grouped: dict[tuple[str, str], dict[str, Any]] = {}
     top: dict[str, Any] = {}
     for path, given in changes.items():
-        value = _converted(path, given)
         table, _, rest = path.partition(".")
-        if path == OF_REST:
-            top["operating_point"] = {**system.operating_point, AFTER: value}
+        if table == AT_REST and rest:
+            at_rest = top.get(AT_REST, system.operating_point)
+            top[AT_REST] = {**at_rest, rest: _converted(rest, _at_rest(system, rest, given))}
             continue
+        value = _converted(path, given)
         if path in TOP:
             top[path] = value
             continue
@@ -76,6 +78,14 @@ def changed(system: System, changes: Mapping[str, Any]) -> System:
         {**top, "components": components, "connections": tuple(connections.values()), "sources": sources, **shared},
     )
     return result
+
+
+def _at_rest(system: System, path: str, value: Any) -> Any:
+    """The value at a path of the operating point; raises `UsageError` where the system cannot have it."""
+    if path != AFTER:
+        with prefixed(f"{AT_REST}."):
+            changed(system, {path: value})
+    return value
 
 
 def at_operating_point(system: System) -> System:
@@ -140,11 +150,12 @@ def _converted(path: str, value: Any) -> Any:
 
 def value_at(system: System, path: str) -> Any:
     """The value at a path, None where it is not set; raises `UsageError` as `changed` does."""
-    if path == OF_REST:
-        return system.operating_point.get(AFTER)
     if path in TOP:
         return getattr(system, path)
     table, _, rest = path.partition(".")
+    if table == AT_REST and rest:
+        at_rest = system.operating_point
+        return at_rest[rest] if rest in at_rest else None if rest == AFTER else value_at(system, rest)
     name, key = _split(system, path, table, rest)
     if table == "components":
         component = system.components[name]
@@ -183,10 +194,10 @@ def _split(system: System, path: str, table: str, rest: str) -> tuple[str, str]:
         **{shared: getattr(system, shared) for shared in SHARED},
     }
     if table not in tables:
-        listed = f"{', '.join(TOP)} or one that begins with {', '.join(tables)}"
+        listed = f"{', '.join(TOP)} or one that begins with {', '.join(tables)}, {AT_REST}"
         if table in ("order", *(f.name for f in dataclasses.fields(System))):
             raise UsageError(f"{path}: {_IN_FILE_ONLY}; expected {listed}")
-        raise UsageError(f"{path}: no such path; expected {listed}{did_you_mean(table, [*TOP, *tables])}")
+        raise UsageError(f"{path}: no such path; expected {listed}{did_you_mean(table, [*TOP, *tables, AT_REST])}")
     known = list(tables[table])
     names = [name for name in known if rest.startswith(f"{name}.")]
     if not names:

@@ -3,7 +3,7 @@
 import math
 from typing import Any, TypeGuard
 
-from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.errors import UsageError, shown, told_apart
 from orchestration.foundation.basics.times import exact_nanoseconds
 
 
@@ -52,7 +52,8 @@ def require_loss(of: object, name: str, burst_length: float | None, place: str) 
         return
     require(is_number(length) and 1.0 <= length < math.inf, f"{place}burst_length", length, "at least 1 loss")
     possible = length / (length + 1.0)
-    require(loss <= possible or loss == 1.0, place + name, loss, f"at most {possible:g} in bursts of {length:g}")
+    at_most = f"at most {told_apart(loss, possible)[1]} in bursts of {length:g}"
+    require(loss <= possible or loss == 1.0, place + name, loss, at_most)
 
 
 def require_own_clock(of: Any, place: str = "") -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from fmu_kit.new_files import write_atomically
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.terminal import Share, ShareProgress, share_reporter
 from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseconds
@@ -49,6 +49,7 @@ MOST_LOST, MOST_LOST_GIVEN = 8, 16
 """Losses in a row that are considered, and that may be requested: sequences double with each"""
 MOST_STATES = 40
 """states that act on one another for which a proof is sought"""
+_OPEN_AT_ONCE = "beyond, two draws would be open at once"
 SHARES = (0.95, 0.97, 0.98, 0.99, 1.0)
 """Shares of the breaking or the largest value: tried for a certificate, upward; below the first by bisection"""
 FINEST = 0.02
@@ -254,10 +255,9 @@ def _of_times(timeline: LoopTimeline, varying: Varying, last: float | None, prog
     possible = floor_to_nanoseconds(timeline.largest())
     largest = possible if last is None else floor_to_nanoseconds(last)
     if last is not None and not 0.0 < last <= possible:
-        raise UsageError(
-            f"--to {last:g}: expected above 0, and at most {possible:g} s; beyond, two draws would be open at once"
-        )
-    beyond = "beyond, two draws would be open at once" if largest == possible else ""
+        given, allowed = told_apart(last, possible)
+        raise UsageError(f"--to {given}: expected above 0, and at most {allowed} s; {_OPEN_AT_ONCE}")
+    beyond = _OPEN_AT_ONCE if largest == possible else ""
     searched = (
         f"draws at either end of each range, sequences that repeat after at most {LONGEST_SEQUENCE}, "
         f"values up to {largest:g} s"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestration.components.fmi.foreign_calls import isolated_call
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
@@ -53,7 +53,8 @@ class Expected:
     @property
     def verdict(self) -> str:
         """The expectations, or that there are none, by the growth of second moments."""
-        radius = f"mean-square radius {self.mean_square_radius:.4g} in {quantity(self.period, 's')}"
+        shown, _ = told_apart(self.mean_square_radius, 1.0, digits=4)
+        radius = f"mean-square radius {shown} in {quantity(self.period, 's')}"
         if self.horizon is None and self.mean_square_radius >= 1.0:
             return f"no mean of squares is finite: {radius}"
         known = [f"{name} = {value:.4g}" for name, value in self.objectives.items() if value is not None]
@@ -62,7 +63,8 @@ class Expected:
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{name} {'-' if v is None else f'{v:.6g}'}" for name, v in self.objectives.items())
-        return f"<Expected: {listed or 'no objectives'}; mean-square radius {self.mean_square_radius:.6g}>"
+        radius, _ = told_apart(self.mean_square_radius, 1.0)
+        return f"<Expected: {listed or 'no objectives'}; mean-square radius {radius}>"
 
 
 def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float | None = None) -> Expected:
@@ -98,7 +100,7 @@ def expected_of(system: System, loops: Loops, horizon: float | None = None, flow
         converged = loops.solve_to(system, horizon)
         means = converged.result
     if means is None:
-        why = f"the mean-square radius is {loop.radius:.6g}: the mean has no finite expectation"
+        why = f"the mean-square radius is {told_apart(loop.radius, 1.0)[0]}: the mean has no finite expectation"
         values: dict[str, float | None] = dict.fromkeys(system.objectives)
         reasons = {**linear.objectives.reasons, **dict.fromkeys(linear.objectives.calls, why)}
     else:

@@ -10,7 +10,7 @@ from orchestration.components.building.fmus import locate, native_twin, native_t
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, ends_of_good
-from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, prefixed
+from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, prefixed, told_apart
 from orchestration.foundation.basics.terminal import inform, progress_bar
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.files import Files
@@ -149,7 +149,7 @@ def infinite_means_in_words(metrics: Iterable[str], where: str, radius: float) -
     """A warning about averages of these objectives over runs, in one line; `where` as " at 1 of 2 points"."""
     return (
         f"{', '.join(metrics)}: without a finite expectation{where}, so an average over runs means nothing; "
-        f"the mean-square radius is {radius:.6g} (quadcosim expect)"
+        f"the mean-square radius is {told_apart(radius, 1.0)[0]} (quadcosim expect)"
     )
 
 

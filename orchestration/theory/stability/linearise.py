@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestration.components.fmi.foreign_calls import isolated_call
 from orchestration.components.fmi.reuse import Instances
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.terminal import progress_bar
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.foundation.basics.unit_algebra import counted, quantity
@@ -197,5 +197,4 @@ def stability_of(radius: float) -> str:
     """Whether a loop with a spectral radius is stable, in words."""
     if math.isclose(radius, 1.0, abs_tol=NEAR_ONE):
         return f"not decidably stable: spectral radius {radius:.9g}"
-    shown = f"{radius:.4g}" if abs(radius - 1.0) > 1e-3 else f"{radius:.9g}"
-    return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {shown}"
+    return f"{'stable' if radius < 1.0 else 'unstable'}: spectral radius {told_apart(radius, 1.0, digits=4)[0]}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.unit_algebra import quantity
@@ -120,7 +120,8 @@ def step(request: RequestLike, component: str | None = None) -> Step:
     loop = linearise(request, component)
     expect_decided(loop)
     if loop.radius > 1.0:
-        raise UsageError(f"step: expected a stable loop; the spectral radius of this one is {loop.radius:.6g}")
+        radius, _ = told_apart(loop.radius, 1.0)
+        raise UsageError(f"step: expected a stable loop; the spectral radius of this one is {radius}")
     whole, count = closed(loop), len(loop.component.outputs) // loop.samples
     each = np.tile(np.eye(count), (loop.samples, 1))  # a step of 1 on a command is on all of its samples
     responses = _responses(whole, each, float(np.abs(np.linalg.eigvals(whole.A)).max(initial=0.0)))

@@ -134,7 +134,7 @@ def test_an_fmu_may_be_an_axis(system: System, tmp_path: Path) -> None:
     [
         (
             "timing.period",
-            "timing.period: no such path; expected stop_time, seed, operating_point.after or one that begins with",
+            "timing.period: no such path; expected stop_time, seed or one that begins with",
         ),
         (
             "components.tank.step",

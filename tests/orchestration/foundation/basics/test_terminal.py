@@ -1,14 +1,17 @@
 """Progress of long work: a bar on a terminal, occasional lines where none can be drawn."""
 
 import io
+import re
 import sys
+import threading
 import time
 from collections.abc import Callable
+from queue import SimpleQueue
 
 import pytest
 
 from orchestration.foundation.basics import terminal
-from orchestration.foundation.basics.terminal import SPARSE, progress_bar, runs_bar
+from orchestration.foundation.basics.terminal import SPARSE, progress_bar, runs_bar, stated_beside_bar
 
 
 class Terminal(io.StringIO):
@@ -51,6 +54,16 @@ def test_occasional_lines_count_runs_too(
             wait(0.6 * SPARSE)
             progress(done, 50)
     assert capsys.readouterr().err.splitlines() == ["1 of 50 runs, 10 min left", "3 of 50 runs, 6 min left"]
+
+
+def test_long_work_that_tells_no_share_says_that_it_goes_on_and_what_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: SimpleQueue[str] = SimpleQueue()
+    monkeypatch.setattr(terminal, "SILENCE", 0.05)
+    monkeypatch.setattr(terminal, "inform", said.put)
+    with progress_bar("certifying") as progress, stated_beside_bar("linear model of plant"):
+        progress(0.25)
+        assert re.fullmatch(r"certifying: 25%, linear model of plant, \d+ s so far", said.get(timeout=60.0))
+    assert all(each.name != "progress" for each in threading.enumerate())
 
 
 def test_short_work_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,6 +26,8 @@ UNITS = {"ultimate_bound": "m", "settling_time": "s"}
     ("good", "values", "text"),
     [
         ("ultimate_bound < 0.05", {"ultimate_bound": 0.0623}, "ultimate_bound = 0.0623 m, expected < 0.05 m"),
+        ("ultimate_bound < 0.05", {"ultimate_bound": 0.05000004}, "ultimate_bound = 0.05000004 m, expected < 0.05 m"),
+        ("ultimate_bound < 2.50003", {"ultimate_bound": 2.50004}, "ultimate_bound = 2.50004 m, expected < 2.50003 m"),
         ("ultimate_bound < 0.05", {"ultimate_bound": None}, "ultimate_bound has no value, expected < 0.05 m"),
         (
             "ultimate_bound < 0.05 and settling_time <= 5",

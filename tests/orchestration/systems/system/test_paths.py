@@ -33,6 +33,17 @@ def test_a_change_by_path_changes_nothing_else(path: str, value: object) -> None
     assert [value_at(system, other) for other in others] == [value_at(quadrotor(), other) for other in others]
 
 
+def test_values_at_rest_are_changed_by_path_beside_each_other_and_the_systems_own_are_not() -> None:
+    gain, own = "components.controller.parameters.gain.eta", 12.0
+    system = changed(quadrotor(), {gain: own})
+    assert value_at(system, f"operating_point.{gain}") == own
+    rested = changed(system, {f"operating_point.{gain}": 11.0, "operating_point.after": 3.0})
+    assert rested.operating_point == {**system.operating_point, gain: 11.0, "after": 3.0}
+    assert (value_at(rested, f"operating_point.{gain}"), value_at(rested, gain)) == (11.0, own)
+    with pytest.raises(UsageError, match=r"operating_point\.components\.controler\.step: expected .*mean controller"):
+        changed(system, {"operating_point.components.controler.step": 1.0})
+
+
 DRAWN = Distribution(uniform=(0.0, 0.002))
 
 

@@ -79,6 +79,8 @@ def test_a_step_of_a_reference_is_that_of_a_run_of_a_linear_loop_of_two_rates(ma
     )
     assert document["verdict"].startswith("motor.speed follows a step of 1 rad/s of wanted: rises in 5.6 ms, overshoot")
     assert document["remaining_error"] == 0.0
+    found = step_response(motor, to="wanted", of="motor.speed")
+    assert (document["times"], document["response"]) == (found.times.tolist(), found.response.tolist())
     assert (tmp_path / "step_wanted_motor_speed.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -330,6 +330,10 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     assert "left out here: delay_jitter and loss of connections.command; expect includes them" in told.stderr
     stepped = json.loads(told.stdout)
     assert {"rise_time", "overshoot", "settling_time", "steady_state"} < stepped.keys()
+    assert (stepped["times"], stepped["responses"]) == (
+        step_of("dc_servo").times.tolist(),
+        step_of("dc_servo").responses.tolist(),
+    )
     assert stepped["verdict"].startswith("a step on controller.u settles in 300 ms, overshoot 54.7 %, 100 % taken back")
     of_floats = [dataclasses.replace(one, in_double=("a", "b")) for one in (step_of("dc_servo"), bode_of("dc_servo"))]
     assert all(one.verdict.endswith("tions, float code of a, b in double precision)") for one in of_floats)
