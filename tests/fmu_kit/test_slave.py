@@ -122,3 +122,26 @@ def test_an_attribute_that_a_method_sets_without_declaring_it_is_refused_with_it
     )
     assert f"test_slave.py, line {line}: self.som: no such variable; expected sum, count, or a name" in str(error.value)
     expect_declared(Sum)
+
+
+def test_an_attribute_or_a_name_that_a_method_only_reads_is_refused_where_nothing_declares_it() -> None:
+    class Misread(Sum):
+        _kept = 1.0
+
+        def step(self, t: float, h: float) -> None:
+            self.sum += self.gain * self._kept * self.cuont
+
+    with pytest.raises(
+        AttributeError, match=r"line \d+: self\.cuont: no such variable; expected u, sum, gain, on, count, or"
+    ):
+        expect_declared(Misread)
+
+    class Misnamed(Sum):
+        def step(self, t: float, h: float) -> None:
+            def added(x: float) -> float:
+                return x + abs(GIAN)  # type: ignore[name-defined]  # noqa: F821
+
+            self.sum = added(self.sum)
+
+    with pytest.raises(AttributeError, match=r"line \d+: GIAN: expected a name of its module or of Python"):
+        expect_declared(Misnamed)
