@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag, solve_discrete_lyapunov
-from scipy.optimize import minimize
 
 from docs.lateral_basin.period import STATES, Loop
 from orchestration.foundation.basics.simulator import Floats
@@ -32,6 +31,8 @@ VERTICAL = np.log(0.5)
 
 def largest_ellipsoid(loop: Loop, evaluations: int) -> Floats:
     """R of the ellipsoid |R x| ≤ 1 of largest volume that the search finds."""
+    from scipy.optimize import minimize
+
     directions = np.random.default_rng(1).standard_normal((6, POINTS))
     directions /= np.linalg.norm(directions, axis=0)
     jacobian = _jacobian(loop)

@@ -4,9 +4,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 from tests.extent import WHOLE
 from tests.patience import PATIENCE
@@ -27,6 +25,9 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, list[Any]]:
 
     Each begins in an empty folder and with none of the names of the one before.
     """
+    import nbformat
+    from nbclient import NotebookClient
+
     cells = {path: nbformat.read(path, as_version=4).cells for path in RUN}
     all_cells = []
     for path, own in cells.items():
@@ -50,6 +51,8 @@ def test_a_notebook_runs_from_top_to_bottom_and_shows_its_results(path: Path, ex
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_kept_without_outputs(path: Path) -> None:
+    import nbformat
+
     notebook = nbformat.read(path, as_version=4)
     nbformat.validate(notebook)
     for cell in notebook.cells:

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from fmu_kit.algebra import Inertia, Quaternion, Vec3, is_positive_definite
 from orchestration.simulation.engines.sources import NUMPY
@@ -169,6 +167,8 @@ def test_opposite_quaternions_are_the_same_rotation(Q: Quaternion, v: Vec3) -> N
 
 
 def test_an_attitude_is_the_rotation_from_body_to_inertial_frame_that_scipy_has() -> None:
+    from scipy.spatial.transform import Rotation
+
     turn, v = Rotation.from_rotvec([0.4, -1.1, 0.7]), Vec3(0.3, 2.0, -1.0)
     found = Quaternion.from_xyzw(*turn.as_quat().tolist()).to_inertial(v)
     np.testing.assert_allclose([*found], turn.apply([*v]), rtol=0.0, atol=ROUNDING)
@@ -391,31 +391,44 @@ def test_sum_of_an_array_and_a_vector_means_nothing(left: Any) -> None:
         left + Vec3(1.0, 2.0, 3.0)
 
 
-a1, a2, a3, b1, b2, b3, c1, c2, c3, p0, q0 = sympy.symbols("a1:4 b1:4 c1:4 p0 q0", real=True)
-A, B, C = Vec3(a1, a2, a3), Vec3(b1, b2, b3), Vec3(c1, c2, c3)
+@pytest.fixture(scope="module")
+def symbols() -> tuple[Vec3, Vec3, Vec3, Any, Any]:
+    """Three vectors and two numbers."""
+    import sympy
+
+    *nine, p0, q0 = sympy.symbols("a1:4 b1:4 c1:4 p0 q0", real=True)
+    return Vec3(*nine[:3]), Vec3(*nine[3:6]), Vec3(*nine[6:]), p0, q0
 
 
 def expanded(values: Any) -> list[Any]:
+    import sympy
+
     return [sympy.expand(sympy.nsimplify(value)) for value in values]
 
 
-def test_cross_product_of_symbols_is_orthogonal_to_its_factors() -> None:
+def test_cross_product_of_symbols_is_orthogonal_to_its_factors(symbols: Any) -> None:
+    A, B, *_ = symbols
     assert expanded([A.cross(B) @ A, A.cross(B) @ B]) == [0, 0]
 
 
-def test_product_of_symbols_rotates_by_its_left_factor_first() -> None:
+def test_product_of_symbols_rotates_by_its_left_factor_first(symbols: Any) -> None:
+    A, B, C, p0, q0 = symbols
     P, Q = Quaternion(A, p0), Quaternion(B, q0)
     assert expanded((P * Q).to_body(C) - Q.to_body(P.to_body(C))) == [0, 0, 0]
 
 
-def test_rotation_there_and_back_scales_symbols_by_the_fourth_power_of_the_norm() -> None:
+def test_rotation_there_and_back_scales_symbols_by_the_fourth_power_of_the_norm(symbols: Any) -> None:
+    A, B, _, _, q0 = symbols
     Q = Quaternion(A, q0)
     squared = A @ A + q0 * q0
     assert expanded(Q.to_inertial(Q.to_body(B)) - (squared * squared) * B) == [0, 0, 0]
 
 
-def test_inertia_of_symbols_is_undone_by_solve() -> None:
-    J = Inertia(xx=a1, yy=a2, zz=a3, xy=b1, xz=b2, yz=b3)
+def test_inertia_of_symbols_is_undone_by_solve(symbols: Any) -> None:
+    import sympy
+
+    A, B, C, *_ = symbols
+    J = Inertia(xx=A.x, yy=A.y, zz=A.z, xy=B.x, xz=B.y, yz=B.z)
     assert [sympy.simplify(value) for value in J.solve(J @ C) - C] == [0, 0, 0]
 
 

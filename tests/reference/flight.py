@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from tests.reference.law import Parameters, evaluate, rotation, skew
 
@@ -96,6 +95,8 @@ def integrated(
     rtol: float = 1e-12,
 ) -> Array:
     """The state at `end` [s] from the one at `start` [s] under one command."""
+    from scipy.integrate import solve_ivp
+
     solution = solve_ivp(motion, (start, end), x, method="DOP853", rtol=rtol, atol=1e-14, args=(command, p, force))
     if not solution.success:
         raise ArithmeticError(solution.message)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from controller_fmu.cascaded.attitude_loop import AttitudeLoop, attitude_of, with_weighted_yaw
 from fmu_kit.algebra import Quaternion, Vec3
@@ -60,6 +59,8 @@ def test_a_step_is_answered_as_the_sampled_loop_does(axis: int, gain: float) -> 
 
 def second_form(attitude: Quaternion, desired: Quaternion, weight: float) -> np.ndarray:
     """The weighted error by rotation matrices: the axis of Rᵀ R_d' times 2 sin of half its angle."""
+    from scipy.spatial.transform import Rotation
+
     R, R_d = (Rotation.from_quat([*Q]).as_matrix() for Q in (attitude, desired))
     across = np.cross(R[:, 2], R_d[:, 2])
     angle = math.atan2(float(np.linalg.norm(across)), float(R[:, 2] @ R_d[:, 2]))
@@ -76,6 +77,8 @@ def second_form(attitude: Quaternion, desired: Quaternion, weight: float) -> np.
 
 @given(attitudes(), attitudes(), st.floats(0.05, 1.0))
 def test_the_reduced_weight_of_yaw_is_that_of_rotation_matrices(Q: Quaternion, Q_d: Quaternion, weight: float) -> None:
+    from scipy.spatial.transform import Rotation
+
     now, then = Q.z_axis(), Q_d.z_axis()
     assume(now @ then > -0.999 and now.cross(then).norm() > 1e-6)
     error = Q.inverse() * with_weighted_yaw(Q, Q_d, weight)

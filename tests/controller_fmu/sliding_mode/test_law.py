@@ -10,7 +10,6 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-import sympy
 from hypothesis import assume, given, note
 from hypothesis import strategies as st
 
@@ -479,17 +478,23 @@ def test_exponent_of_one_has_no_boundary_layer() -> None:
 
 # -- (g) other scalars --------------------------------------------------------------------------------------
 
-SYMBOLIC = ScalarOps(
-    sqrt=sympy.sqrt,
-    tanh=sympy.tanh,
-    sin=sympy.sin,
-    cos=sympy.cos,
-    atan2=sympy.atan2,
-    sign=sympy.sign,
-    maximum=sympy.Max,
-    where=lambda condition, a, b: sympy.Piecewise((a, condition), (b, True)),
-    all=lambda condition: True,
-)
+
+@pytest.fixture(scope="module")
+def symbolic() -> ScalarOps:
+    """The functions of symbols."""
+    import sympy
+
+    return ScalarOps(
+        sqrt=sympy.sqrt,
+        tanh=sympy.tanh,
+        sin=sympy.sin,
+        cos=sympy.cos,
+        atan2=sympy.atan2,
+        sign=sympy.sign,
+        maximum=sympy.Max,
+        where=lambda condition, a, b: sympy.Piecewise((a, condition), (b, True)),
+        all=lambda condition: True,
+    )
 
 
 def components(evaluation: Evaluation) -> list[Any]:
@@ -510,24 +515,28 @@ def test_law_in_fifty_digits_agrees_with_floats(data: Path, table: str) -> None:
                 assert abs(x - y) <= 1e-12 * max(1.0, abs(y))
 
 
-def test_law_of_a_symbol_agrees_with_floats(data: Path) -> None:
+def test_law_of_a_symbol_agrees_with_floats(data: Path, symbolic: ScalarOps) -> None:
     """The angular velocity about x as a symbol: the torque is a polynomial of second degree in it."""
+    import sympy
+
     _, rows = read(data / "law_general.csv")
     x = sympy.Symbol("x", real=True)
     for row in rows[:3].tolist():
         state, reference = arguments(row)
         omega = Vec3(x, state.angular_velocity.y, state.angular_velocity.z)
-        now = evaluate(state._replace(angular_velocity=omega), reference, *CASES["law_general.csv"], SYMBOLIC)
+        now = evaluate(state._replace(angular_velocity=omega), reference, *CASES["law_general.csv"], symbolic)
         expected = components(evaluate(state, reference, *CASES["law_general.csv"]))
         actual = [float(sympy.sympify(value).subs(x, state.angular_velocity.x)) for value in components(now)]
         np.testing.assert_allclose(actual, expected, rtol=1e-10, atol=1e-10)
         assert sympy.degree(sympy.expand(now.torque.y), x) == 2
 
 
-def test_surface_of_symbols_is_its_own_antiderivative() -> None:
+def test_surface_of_symbols_is_its_own_antiderivative(symbolic: ScalarOps) -> None:
+    import sympy
+
     e = sympy.Symbol("e", real=True)
     gains = Gains(k_s=3.0, beta_t=0.5, epsilon=0.01)
-    slopes = surface(Vec3(e, e, e), gains, SYMBOLIC)
+    slopes = surface(Vec3(e, e, e), gains, symbolic)
     slope, curvature = sympy.diff(slopes.gamma.x * e, e), sympy.diff(slopes.gamma_prime.x, e)
     for value in (-2.0, -0.5, -0.001, 0.001, 0.02, 1.0):
         assert slope.subs(e, value) == pytest.approx(slopes.gamma_prime.x.subs(e, value))

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from scipy.optimize import minimize
 
 from orchestration.components.building import fmus
 from orchestration.experiments.studies.axes import Axis
@@ -49,6 +48,8 @@ def cost(K: float, Td: float) -> float:
 
 
 def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp_path: Path) -> None:
+    from scipy.optimize import minimize
+
     found = tuned(tuning(evaluations=30), tmp_path)
     (one,) = found.searches
     K, Td = (one.values[f"{GAINS}.{name}"] for name in ("K", "Td"))

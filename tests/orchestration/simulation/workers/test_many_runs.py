@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
 
 import quadcosim
 from orchestration.foundation.basics.errors import QuadcosimError
@@ -158,6 +157,8 @@ def test_arrays_of_any_shape_broadcast_and_become_the_axes_of_a_dataset() -> Non
 
 @needs_compiler
 def test_the_index_of_a_table_and_the_dimensions_of_arrays_are_kept() -> None:
+    import xarray as xr
+
     brief: Any = NATIVE.with_changes(stop_time=0.01)
     table = pd.DataFrame({X: [0.0, 1.0, 2.0], Y: 0.5})
     chosen = table[table[X] > 0.0]
@@ -173,31 +174,28 @@ def test_the_index_of_a_table_and_the_dimensions_of_arrays_are_kept() -> None:
 
 
 def test_a_dimension_of_the_values_has_not_the_name_of_that_of_the_rows() -> None:
+    import xarray as xr
+
     values = {X: xr.DataArray([0.0, 1.0], dims="time")}
     assert quadcosim.fly(SHORT, values, outputs=["good"]).to_xarray()["good"].sizes == {"time": 2}
     with pytest.raises(QuadcosimError, match=r"^values: a dimension is called time, as that of what is recorded"):
         quadcosim.fly(SHORT, values, record=["plant.position.x"])
 
 
-NAMED = xr.DataArray([0.0, 1.0], {"side": ["left", "right"]}, "side")
-OTHERWISE: list[tuple[dict[str, Any], str]] = [
-    ({X: pd.Series([0.0, 1.0]), Y: pd.Series([0.0, 1.0], [1, 0])}, rf"^values of {Y}: index has other labels than bef"),
-    (
-        {X: NAMED, Y: NAMED[::-1]},
-        rf"^values of {Y}: side has other labels than before; expected the same for all, in th",
-    ),
-    ({X: NAMED, Y: xr.DataArray([0.0] * 3, dims="side")}, rf"^values of {Y}: side: 3 values; expected 2 as before$"),
-    (
-        {X: NAMED, Y: NAMED.rename(side="w"), "seed": [0, 1]},
-        "^values of seed: an array; expected one of xarray with di",
-    ),
-]
+def test_labels_that_contradict_each_other_are_refused() -> None:
+    import xarray as xr
 
-
-@pytest.mark.parametrize(("values", "message"), OTHERWISE, ids=["index", "labels", "length", "no_names"])
-def test_labels_that_contradict_each_other_are_refused(values: dict[str, Any], message: str) -> None:
-    with pytest.raises(QuadcosimError, match=message):
-        quadcosim.fly(SHORT, values)
+    named = xr.DataArray([0.0, 1.0], {"side": ["left", "right"]}, "side")
+    one, other = pd.Series([0.0, 1.0]), pd.Series([0.0, 1.0], [1, 0])
+    cases: list[tuple[dict[str, Any], str]] = [
+        ({X: one, Y: other}, rf"^values of {Y}: index has other labels than bef"),
+        ({X: named, Y: named[::-1]}, rf"^values of {Y}: side has other labels than before; expected the same for all"),
+        ({X: named, Y: xr.DataArray([0.0] * 3, dims="side")}, rf"^values of {Y}: side: 3 values; expected 2 as bef"),
+        ({X: named, Y: named.rename(side="w"), "seed": [0, 1]}, "^values of seed: an array; expected one of xarray "),
+    ]
+    for values, message in cases:
+        with pytest.raises(QuadcosimError, match=message):
+            quadcosim.fly(SHORT, values)
 
 
 @needs_compiler

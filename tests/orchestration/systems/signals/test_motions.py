@@ -5,7 +5,6 @@ import math
 import mpmath
 import numpy as np
 import pytest
-import sympy
 
 from fmu_kit.trajectory import Reference, Trajectory
 from orchestration.simulation.engines.sources import EXACT, motion_values
@@ -94,6 +93,8 @@ def test_a_speed_is_the_largest_on_the_way() -> None:
 
 
 def test_the_step_of_degree_nine_is_the_one_whose_four_derivatives_vanish_at_both_ends() -> None:
+    import sympy
+
     x = sympy.Symbol("x")
     polynomial = 126 * x**5 - 420 * x**6 + 540 * x**7 - 315 * x**8 + 70 * x**9
     assert polynomial.subs(x, 1) == 1
