@@ -107,6 +107,7 @@ def search_exactly(
         values=tuning.values(best.shares.tolist()),
         cost=math.inf if cost is None else cost,
         own_cost=math.inf if best.own_cost is not None and best.own_cost >= UNSTABLE else best.own_cost,
+        lowered=best.lowered,
         of_ranges=tuning.of_ranges(best.shares.tolist()),
         evaluations=best.evaluations,
         note=f"{without} of {len(tried)} candidates had no expectation, the first, {told()}" if without else "",

@@ -55,7 +55,7 @@ class Tuned:
         """The lowest cost for each period, beside that of the file's own values."""
         costs = [
             f"{'own periods' if period is None else quantity(period, 's')} "
-            + "; ".join(filter(None, [one.compared, one.of_ranges, one.judgement]))
+            + "; ".join(filter(None, [one.compared, one.convergence, one.of_ranges, one.judgement]))
             for period, one in self.best.items()
         ]
         return f"best of {len(self.searches)} searches: {some(costs, '; ')}"
@@ -198,7 +198,7 @@ def run_searches(
             one = find(period, seed, _part(progress, i, len(searches)), functools.partial(record.keeping, period))
             record.add(one)
             done.append(one)
-            announce(f"{one.place}, seed {seed}: cost {one.cost:.5g}; {one.judgement}")
+            announce(f"{one.place}, seed {seed}: cost {one.cost:.5g}, {one.convergence}; {one.judgement}")
             if one.note:
                 announce(one.note)
     return done

@@ -150,6 +150,7 @@ def search(
         values=values,
         cost=best.cost,
         own_cost=best.own_cost,
+        lowered=best.lowered,
         of_ranges=tuning.of_ranges(best.shares.tolist()),
         evaluations=best.evaluations,
         judged=len(judged),

@@ -121,7 +121,7 @@ def gains_text(tuning: TuningProblem, best: SearchResult, all_results: Sequence[
         *tuning.warnings(best.period),
         f"Of {len(others)} searches that of seed {best.seed} is taken, of least {best.compared}.",
         *([f"{best.of_ranges}."] if best.of_ranges else []),
-        *(f"Seed {one.seed}: {one.judgement}." for one in others),
+        *(f"Seed {one.seed}: {one.convergence}; {one.judgement}." for one in others),
     ]
     document: dict[str, Any] = {}
     for target, value in best.values.items():

@@ -27,6 +27,8 @@ COST = "cost.of"
 """Name of the objective that a tuning adds: the key of its file"""
 AT_BOUND = 0.005
 """Share of a range that counts as its bound"""
+CONVERGED = 0.01
+"""Share of a cost by which the last third of a search may lower it without a word on more evaluations"""
 _WIDTH = 0.25
 """Standard deviation of the first generation, as a share of each range"""
 
@@ -186,6 +188,8 @@ class SearchResult:
     evaluations: int
     own_cost: float | None
     """Cost of the values of the file; None: they are not compared"""
+    lowered: float | None
+    """Share of the lowest cost by which the last third of the generations lowered it; None: it is of one generation"""
     of_ranges: str
     """Parameters that the ranges cut off, in words; empty: none"""
     note: str = ""
@@ -207,6 +211,17 @@ class SearchResult:
         return f"cost {self.cost:.4g}, {ratio}{self.own_cost:.4g} with the file's own values"
 
     @property
+    def convergence(self) -> str:
+        """How much the end of the search still gained, in words."""
+        if self.lowered is None:
+            return f"a single generation of {self.evaluations} evaluations: no search yet"
+        end = f"the last third of {self.evaluations} evaluations"
+        if self.lowered == 0.0:
+            return f"{end} found no lower one"
+        further = ": more may lower it further" if self.lowered > CONVERGED else ""
+        return f"{end} lowered it by {100.0 * self.lowered:.2g} %{further}"
+
+    @property
     def judgement(self) -> str:
         """An assessment besides the cost, in words."""
         raise NotImplementedError
@@ -225,6 +240,8 @@ class Minimum:
     cost: float
     own_cost: float | None
     """the cost of the values of the base; None: a parameter has none there, or several"""
+    lowered: float | None
+    """share by which the last third lowered the cost; None: of one generation"""
     evaluations: int
 
 
@@ -245,28 +262,44 @@ def minimise(
     first = np.random.default_rng(seed).uniform(0.25, 0.75, max(size, 2))  # a second one without effect: cma needs two
     options = {"bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9, "popsize": tuning.generation}
     strategy = cma.CMAEvolutionStrategy(first, _WIDTH, options)
-    best, least, count, own_cost = first[:size], np.inf, 0, None
-    own: Floats | None = None if None in tuning.own else np.array(tuning.own, dtype=float)
-    within = own is not None and bool(((own >= 0.0) & (own <= 1.0)).all())
-    if own is not None and within:
+    best, least, bests, own_cost = first[:size], math.inf, list[float](), None
+    own = None if None in tuning.own else np.array(tuning.own, dtype=float)
+    place = tuning.generation  # of the values of the base in the first one: beside it, or that of its first point
+    if own is not None and ((own >= 0.0) & (own <= 1.0)).all():
+        place = 0
         point = strategy.gp.geno([*own, *first[size:]], strategy.boundary_handler.inverse)
         strategy.inject([point], force=True)
-    while count < tuning.budget:  # no other stopping rule: every controller gets the same effort
+    generations = tuning.budget // tuning.generation
+    for count in range(1, generations + 1):  # no other stopping rule: every controller gets the same effort
         asked = strategy.ask()
         candidates = [np.asarray(candidate)[:size] for candidate in asked]
-        if count == 0 and own is not None:
-            candidates = [own, *candidates[1:]] if within else [*candidates, own]
-        values = costs(candidates)
-        if count == 0 and own is not None:
-            own_cost = float(values[0 if within else -1])
+        if own is not None:
+            candidates[place : place + 1] = [own]
+        values = list(costs(candidates))
+        if own is not None:
+            own_cost, own = float(values[place]), None
         values = values[: len(asked)]
         strategy.tell(asked, values)
-        count += len(asked)
-        place = int(np.argmin(values))
-        if values[place] < least:
-            best, least = candidates[place], values[place]
-        progress(count / tuning.budget)
-    return Minimum(shares=best, cost=float(least), own_cost=own_cost, evaluations=count)
+        found = int(np.argmin(values))
+        if values[found] < least:
+            best, least = candidates[found], float(values[found])
+        bests.append(least)
+        progress(count / generations)
+    return Minimum(
+        shares=best,
+        cost=least,
+        own_cost=own_cost,
+        lowered=_lowered(bests),
+        evaluations=tuning.budget,
+    )
+
+
+def _lowered(bests: Sequence[float]) -> float | None:
+    """Share by which the last third of generations lowered the lowest cost."""
+    if len(bests) < 2:
+        return None
+    before, after = bests[2 * len(bests) // 3 - 1], bests[-1]
+    return 0.0 if before == after else 1.0 if math.isinf(before) or not before else (before - after) / abs(before)
 
 
 def best_by_period(results: Sequence[SearchResult]) -> Iterator[SearchResult]:

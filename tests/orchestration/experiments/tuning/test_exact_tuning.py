@@ -126,11 +126,13 @@ def test_a_search_begins_with_the_values_of_the_file_and_says_what_they_cost(
     kept = tuned(tuning(evaluations=3), tmp_path)
     (one,) = kept.searches
     assert one.values == {f"{GAINS}.K": pytest.approx(1.5), f"{GAINS}.Td": pytest.approx(0.035)}
-    assert "6 ms cost 2, that of the file's own values: none costs less; the mean-" in kept.verdict
+    none_less = "6 ms cost 2, that of the file's own values: none costs less; a single generation of 6 evaluations: no "
+    assert f"{none_less}search yet; the mean-" in kept.verdict
 
     off, Td = Axis(name="K", targets=(f"{GAINS}.K",), low=2.0, high=3.0), tuning().parameters[1]
     other = tuned(tuning(parameters=(off, Td), evaluations=40, name="off"), tmp_path)
-    assert "6 ms cost 5, 2.5 times 2 with the file's own values; K = 2 lies on the lower bound of its" in other.verdict
+    assert "6 ms cost 5, 2.5 times 2 with the file's own values; the last third of 84 evaluations" in other.verdict
+    assert "; K = 2 lies on the lower bound of its range: widen it; the file's own K = 1.5" in other.verdict
     assert "widen it; the file's own K = 1.5 lies outside of its range; the mean-" in other.verdict
     text = other.written[0].read_text()
     assert "of least cost 5, 2.5 times 2 with the file's own values.\n# K = 2 lies on the lower bound" in text

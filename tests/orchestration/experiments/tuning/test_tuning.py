@@ -54,6 +54,19 @@ def test_a_search_finds_the_bottom_of_a_bowl(tuning):
     assert found.evaluations == tuning.budget
 
 
+def test_a_search_says_by_how_much_its_end_still_lowered_the_cost(tuning):
+    two = replace(tuning, evaluations=9)  # three generations of six, for two parameters
+    assert two.budget == 18
+    costs = iter([[8.0] * 6, [4.0] * 6, [3.0] * 6])
+    assert minimise(two, 1, lambda points: next(costs)[: len(points)], lambda share: None).lowered == 0.25
+    found = search(two, 0.01, 1, bowl, bowl, lambda share: None)
+    assert replace(found, lowered=0.25).convergence == (
+        "the last third of 18 evaluations lowered it by 25 %: more may lower it further"
+    )
+    assert replace(found, lowered=0.0004).convergence.endswith("lowered it by 0.04 %")
+    assert replace(found, lowered=0.0).convergence == "the last third of 18 evaluations found no lower one"
+
+
 def test_searches_are_reproducible_and_depend_on_the_seed(tuning):
     one, again, other = (search(tuning, 0.01, seed, bowl, bowl, lambda share: None) for seed in (1, 1, 2))
     assert one == again
