@@ -1,7 +1,8 @@
 """The delay margin of a command: how much later it may come before the loop is unstable, in whole nanoseconds.
 
 A delay by a part of a sample shifts the hold at a receiver in continuous time, and at a sampled one it acts in jumps,
-where a message misses a sample. So the loop is made as late by such a part; whole samples are further states of it. A
+where a message misses a sample. So the loop is made as late by such a part; whole samples are further states of it, or
+whole periods where the samples are uneven. A
 loop tolerates a further delay d of all samples for certain where, with its complementary sensitivity T over them and
 the frequencies W that they consist of, d σ(T W) < 1 (a small gain): so far the next delay is not tried.
 """
@@ -23,6 +24,8 @@ from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.model import System
 from orchestration.theory.stability.linearise import Linearised
 from orchestration.theory.stability.loop_halves import Sensitivity, places, radius, sensitivity_of, with_rest
+from orchestration.theory.stability.operating_point import hyperperiod
+from orchestration.theory.stability.periodic_schedule import PeriodicSchedule, periodic_schedule
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.sign_changes import zero_between
 from orchestration.theory.stability.state_space import StateSpace, reduced
@@ -50,12 +53,14 @@ MOST_JUMPS = 40
 
 @dataclass(frozen=True, kw_only=True)
 class Late:
-    """The rest of a loop to which commands come later by less than a sample."""
+    """The rest of a loop to which commands come later by less than a turn."""
 
     rest: Callable[[float], StateSpace]
     """The rest by that delay [s]"""
     jumps: Sequence[float] = ()
     """Delays at which a command comes just at a sample of its receiver, and misses it with more [s]"""
+    turn: int = 1
+    """Samples after which they come at even times: more than 1 where a schedule makes samples or latencies vary"""
 
 
 def delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> float | None:
@@ -68,7 +73,8 @@ def delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> f
     soon = of(frequencies)
     resolved = np.linalg.svd(soon, compute_uv=False).min(axis=1) > RESOLVED
     command = LateCommand(loop, i, frequencies[resolved], late, sensitivities={0.0: of}, soon={0.0: soon[resolved]})
-    if not any(command.ends_stability(part) for part in (*np.arange(PARTS) * loop.dt / PARTS, *command.sides)):
+    parts = np.arange(PARTS * late.turn) * loop.dt / PARTS
+    if not any(command.ends_stability(part) for part in (*parts, *command.sides)):
         return None
     delay, before = 0.0, (0.0, command.growth(0.0))
     for _ in range(MOST):
@@ -85,32 +91,51 @@ def delay_margin(loop: Linearised, i: int, frequencies: Floats, late: Late) -> f
 
 
 def jumps_of(system: System, name: str) -> tuple[float, ...]:
-    """The `jumps` of all that a sampled component sends, less than a sample, in rising order."""
+    """The `jumps` of all that a sampled component sends, less than a turn, in rising order."""
     own, found = system.components[name].sampling, set[Fraction]()
     for x in system.connections:
         apart = apart_of(system, x) if x.sender == name else None
-        if own is None or apart is None:
+        if own is None or apart is None or own.true_period * len(apart.delays) / apart.interval > MOST_JUMPS:
             continue
-        first = (apart.first - exact_nanoseconds(lowest(x.delay))) % apart.interval
-        if own.true_period / apart.interval <= MOST_JUMPS:
-            found.update(first + k * apart.interval for k in range(int(own.true_period / apart.interval)))
+        count = max(1, int(own.true_period / apart.interval))
+        least = ((each - exact_nanoseconds(lowest(x.delay))) % apart.interval for each in apart.delays)
+        found.update(each + k * apart.interval for each in least for k in range(count))
     return tuple(float(jump) / NANOSECONDS for jump in sorted(found))
 
 
 class Apart(NamedTuple):
     """Delays of a connection at which a message comes just at a sample of its receiver [ns]."""
 
-    first: Fraction
+    delays: Sequence[Fraction]
     interval: Fraction
 
 
 def apart_of(system: System, connection: Connection) -> Apart | None:
-    """Those of a connection; None where its ends are not both sampled."""
+    """Those of a connection; None where its ends are not both sampled, or it releases its receiver."""
     own, other = (system.components[end].sampling for end in (connection.sender, connection.receiver))
     if own is None or other is None:
         return None
-    interval = own.true_period / (other.true_period / own.true_period).denominator
-    return Apart((other.true_offset - own.true_offset) % interval, interval)
+    if not system.uses_scheduler:
+        interval = own.true_period / (other.true_period / own.true_period).denominator
+        return Apart([(other.true_offset - own.true_offset) % interval], interval)
+    schedule = periodic_schedule(system)
+    if connection.name in schedule.with_own_delay:
+        return None
+    whole = hyperperiod([own.true_period, other.true_period, NANOSECONDS * schedule.period])
+    sent, received = (_instants(schedule, end, system, whole) for end in (connection.sender, connection.receiver))
+    late = schedule.transit_times.get(connection.name, (0,))
+    arrivals = [each + (late[k % len(late)] or 0) for k, each in enumerate(sent)]
+    return Apart(sorted({(then - now) % whole for now in arrivals for then in received}), whole)
+
+
+def _instants(schedule: PeriodicSchedule, name: str, system: System, whole: Fraction) -> list[Fraction]:
+    """The times in a hyperperiod at which a component samples, in order [ns]."""
+    sampling = system.components[name].sampling
+    assert sampling is not None
+    period, offsets = sampling.true_period, [sampling.true_offset]
+    if name in schedule.samples:
+        period, offsets = NANOSECONDS * schedule.period, [NANOSECONDS * each for each in schedule.samples[name]]
+    return [each + k * period for k in range(int(whole / period)) for each in offsets]
 
 
 @dataclass(frozen=True)
@@ -130,9 +155,13 @@ class LateCommand:
 
     @property
     def sides(self) -> list[float]:
-        """The delays to both sides of each jump, less than a sample [s]."""
+        """The delays to both sides of each jump, less than a turn [s]."""
         sides = {_rounded(jump + side) for jump in self.late.jumps for side in SIDES}
-        return sorted(side for side in sides if side < self.loop.dt)
+        return sorted(side for side in sides if side < self._turn)
+
+    @property
+    def _turn(self) -> float:
+        return self.late.turn * self.loop.dt
 
     def growth(self, delay: float) -> float:
         """The growth rate of small deviations [1/s]."""
@@ -145,8 +174,8 @@ class LateCommand:
         dt = self.loop.dt
         interval = dt / (PARTS if most >= dt / PARTS else FINEST)
         usual = (math.floor(max(delay + most, delay + interval) / interval + 0.01)) * interval
-        whole = math.floor(delay / dt) * dt
-        sides = (_rounded(begin + side) for begin in (whole, whole + dt) for side in self.sides)
+        whole = math.floor(delay / self._turn) * self._turn
+        sides = (_rounded(begin + side) for begin in (whole, whole + self._turn) for side in self.sides)
         return min((_rounded(usual), *(side for side in sides if side > delay)))
 
     def tolerated(self, delay: float) -> float:
@@ -165,7 +194,8 @@ class LateCommand:
         """Whether enough whole samples beside a part of one make the loop unstable: its gain is somewhere above 1."""
         samples = self.loop.samples
         gains = np.linalg.inv(self._soon(_rounded(part))) - np.eye(samples)
-        each = (np.linalg.eigvals(gains @ self._shift(whole, self.frequencies)) for whole in range(samples))
+        shifts = (self._shift(whole, self.frequencies) for whole in range(0, samples, self.late.turn))
+        each = (np.linalg.eigvals(gains @ shift) for shift in shifts)
         return any(bool(np.abs(values).max() > 1.0) for values in each)
 
     def _fine(self, delay: float) -> tuple[Floats, Complexes]:
@@ -218,8 +248,8 @@ class LateCommand:
         return self.sensitivities[part]
 
     def _split(self, delay: float) -> tuple[int, float]:
-        """Whole samples, and the part of one [s]."""
-        whole = math.floor(delay / self.loop.dt + 0.5 / (NANOSECONDS * self.loop.dt))
+        """Whole samples, in whole turns, and what is left [s]."""
+        whole = self.late.turn * math.floor(delay / self._turn + 0.5 / (NANOSECONDS * self._turn))
         return whole, max(0.0, _rounded(delay - whole * self.loop.dt))
 
 

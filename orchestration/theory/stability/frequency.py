@@ -226,13 +226,14 @@ def _bode(request: Request, component: str | None) -> Bode:
         name = sampled_component(system, component)
         models = files_of(system).models_of(system)
         with progress_bar("margins") as report, whole_at_rest(system, instances, models=models) as rest:
-            loop = cut_open(rest, name)
+            loop, calm = cut_open(rest, name), rest.simulation.system
 
             @cache
             def later(delay: float) -> StateSpace:
-                return rest_of_loop(rest, name, delayed(rest.simulation.system, name, delay).connections)
+                return rest_of_loop(rest, name, delayed(calm, name, delay).connections)
 
-            late = Late(rest=later, jumps=jumps_of(rest.simulation.system, name))
+            turn = loop.samples if calm.uses_scheduler else 1
+            late = Late(rest=later, jumps=jumps_of(calm, name), turn=turn)
             expect_decided(loop)
             frequencies, stable = _frequencies(loop), loop.radius < 1.0
             curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]

@@ -17,6 +17,8 @@ from orchestration.theory.stability.excitation import Rest
 from orchestration.theory.stability.linear_simulator import LinearSimulator
 from orchestration.theory.stability.linearised_component import Tangent
 
+TAKE_SEVERAL = "limit, linearise, bode, step, locus or expect, which take several"
+
 
 class LiftedInstance:
     """An instance that takes several samples at a step, each with inputs and outputs of its own."""
@@ -83,11 +85,11 @@ def of_one_rate(tangent: "Tangent | LiftedTangent") -> Tangent:
     raise several_rates(tangent.name, tangent.samples)
 
 
-def several_rates(name: str, samples: int) -> UsageError:
+def several_rates(name: str, samples: int, *, expected: str = TAKE_SEVERAL) -> UsageError:
     """That a component responds alike only every some samples, where one rate is needed."""
     return UsageError(
         f"{name}: responds alike only at every {_nth(samples)} sample, as code of several rates does: expected an FMU, "
-        "and a component, for each rate, or limit, linearise, bode, step, locus or expect, which take several"
+        f"and a component, for each rate, or {expected}"
     )
 
 

@@ -22,6 +22,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
+from orchestration.theory.stability.fixed_periods import inform_of_uneven
 from orchestration.theory.stability.in_double import of_code
 from orchestration.theory.stability.known_loops import rested, warned_of_timing
 from orchestration.theory.stability.lifted_component import lifted_names
@@ -115,6 +116,7 @@ def in_isolation(
         files = files_of(system := system_of(loaded))
         if is_loop:
             inform_of_chance(system)
+            inform_of_uneven(system)
         with warned_of_timing(system, files) if is_loop else nullcontext():
             return isolated_call(files.fmus.values(), find, loaded, asked)
 

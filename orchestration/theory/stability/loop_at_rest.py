@@ -30,12 +30,13 @@ from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import AFTER, System
 from orchestration.theory.stability.equilibrium import Steady, balance
 from orchestration.theory.stability.excitation import Rest
-from orchestration.theory.stability.fixed_periods import in_fixed_periods
+from orchestration.theory.stability.fixed_periods import in_repeated_periods
 from orchestration.theory.stability.identification import FINEST, SampledRest, in_continuous_time, of_samples
 from orchestration.theory.stability.in_double import are_in_double, expect_same_law
-from orchestration.theory.stability.lifted_component import LiftedTangent
+from orchestration.theory.stability.lifted_component import LiftedTangent, several_rates
 from orchestration.theory.stability.linearised_component import Tangent
 from orchestration.theory.stability.operating_point import (
+    LONGEST_HYPERPERIOD,
     NotAnEquilibriumError,
     deterministic,
     exchanged_signals,
@@ -46,11 +47,13 @@ from orchestration.theory.stability.operating_point import (
     longest_period,
     time_to_rest,
 )
+from orchestration.theory.stability.periodic_schedule import common_period, periodic_schedule
 
 SETTLED = 6
 """periods of the run to rest, after messages in transit have arrived"""
 INSTANTS = 1001
 """instants at which it is seen whether a source changes meanwhile"""
+EVEN = "a priority or offsets by which its jobs start at one phase, and nothing is late by one time and another"
 HELD = 2
 """messages that a first-order hold remembers, each of a longest period at most"""
 
@@ -260,7 +263,7 @@ def at_rest(
     and those of equal components there are used again where they hold. Raises `UsageError` where the system does not
     rest there, or has no linear loop, saying why.
     """
-    calm = in_fixed_periods(system)
+    calm = in_repeated_periods(system)
     known = KnownTangents() if known is None else known
     with _settled(calm, _expect_period(calm), instances, extra, models, known) as loop:
         yield loop
@@ -278,11 +281,14 @@ def whole_at_rest(
 
     Their tangents are measured where they rest over that period, once.
     """
-    calm, known = in_fixed_periods(system), KnownTangents() if known is None else known
+    calm, known = in_repeated_periods(system), KnownTangents() if known is None else known
     seen = {name: samples_of(one) for name, (_, _, one) in known.items() if name in calm.components}
     period = hyperperiod([_expect_period(calm), *_cycles(calm, seen)])
     with _settled(calm, period, instances, extra, models, known) as loop:
         sampled = [name for name, one in calm.components.items() if one.sampling is not None]
+        for name in sampled if calm.uses_scheduler else ():
+            if loop.samples(name) > 1:
+                raise several_rates(name, loop.samples(name), expected=EVEN)
         whole = hyperperiod([period, *_cycles(calm, {name: loop.samples(name) for name in sampled})])
         if whole == period:
             yield loop
@@ -364,10 +370,12 @@ def _corrected(calm: System, period: Fraction, instances: Instances, known: Know
 def keep_start(system: System, instances: Instances, known: KnownTangents) -> None:
     """Keep in `known` where a system comes to rest that has a time to run to rest; raises `UsageError`."""
     try:
-        calm = in_fixed_periods(system)
-    except UsageError:  # runs need no fixed periods
+        calm = in_repeated_periods(system)
+        period = common_period(calm, LONGEST_HYPERPERIOD)
+    except UsageError:  # runs need no repeated periods
         calm = deterministic(system)
-    start_of(calm, hyperperiod_of(calm) or longest_period(calm), instances, known)
+        period = hyperperiod_of(calm)
+    start_of(calm, period or longest_period(calm), instances, known)
 
 
 def start_of(calm: System, period: Fraction, instances: Instances, known: KnownTangents) -> Start | None:
@@ -404,10 +412,17 @@ def _rested(
 def begin_of(calm: System, period: Fraction) -> Fraction:
     """Begin of a period in which as many messages are in transit as ever after [ns].
 
-    It is a sample of the component that begins last.
+    It is a sample of the component that begins last; of a schedule, a multiple of the period.
     """
-    delay = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
-    return latest_offset(calm) + math.ceil((delay + HELD * longest_period(calm)) / period) * period
+    late = max((exact_nanoseconds(highest(x.delay)) for x in calm.connections), default=Fraction(0))
+    late += HELD * longest_period(calm)
+    schedule = None
+    with suppress(UsageError):  # a run comes to rest without one that repeats
+        schedule = periodic_schedule(calm) if calm.uses_scheduler else None
+    if schedule is None:
+        return latest_offset(calm) + math.ceil(late / period) * period
+    late += max((Fraction(one or 0) for each in schedule.transit_times.values() for one in each), default=Fraction(0))
+    return math.ceil((max(Fraction(schedule.begin), latest_offset(calm)) + late) / period) * period
 
 
 def written_in(simulation: PreparedRun) -> dict[str, dict[str, float]]:
@@ -448,7 +463,7 @@ def _expect_period(system: System) -> Fraction:
     for name, component in system.components.items():
         if component.sampling is not None and component.sampling.clock == "fmu":
             raise UsageError(f"{name} has its own clock")
-    period = hyperperiod_of(system)
+    period = common_period(system, LONGEST_HYPERPERIOD)
     if period is None:
         raise UsageError(
             "the sampled components have no hyperperiod within twenty of the longest period: expected periods in "

@@ -117,7 +117,7 @@ def step_map(loop: AtRest, inputs: Sequence[str], output: str) -> StepMap:
     if len({len(one) for one in each}) > 1 or not np.isfinite(moved).all():
         raise UsageError("the loop has no finite derivative at the operating point, or its periods differ")
     instants = [0, *(instants_of(each[0][:, 0]) - ends[0]).tolist()]
-    first = after(np.zeros(size), sampled, instants[-2])
+    first = after(np.zeros(size), sampled, max(each for each in instants if each < ends[1] - ends[0]))
     seen, is_state = np.column_stack([one[:, place] for one in each]), _moves(system, simulators, size)
     return StepMap(
         A=moved[np.ix_(is_state, np.append(is_state, False))], b=moved[is_state, -1],

@@ -8,7 +8,7 @@ other yields.
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Integers
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, nanoseconds
+from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.systems.computers import note, parts
 from orchestration.systems.computers.compiled import scheduler
 from orchestration.systems.computers.parts import LATER, NONE
@@ -26,7 +27,7 @@ from orchestration.systems.system.component import Sampling, has_scheduled_insta
 from orchestration.systems.system.distribution import highest
 from orchestration.systems.system.model import System
 from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks, released_by
-from orchestration.theory.stability.operating_point import hyperperiod
+from orchestration.theory.stability.operating_point import hyperperiod, hyperperiod_of, longest_period, periods_of
 from orchestration.theory.stability.scheduled import expect_certain
 
 
@@ -36,6 +37,8 @@ class PeriodicSchedule:
 
     period: Fraction
     """Period [s]"""
+    begin: int = field(compare=False)
+    """The begin of one from which on the events are these [ns]"""
     samples: Mapping[str, tuple[Fraction, ...]]
     """Times of the samples in a period [s], by component"""
     numbers: Mapping[str, tuple[int, ...]]
@@ -49,7 +52,7 @@ class PeriodicSchedule:
 
 
 NO_SCHEDULE = PeriodicSchedule(
-    period=Fraction(1), samples={}, numbers={}, sent={}, transit_times={}, with_own_delay=frozenset()
+    period=Fraction(1), begin=0, samples={}, numbers={}, sent={}, transit_times={}, with_own_delay=frozenset()
 )  # fmt: skip
 """Schedule of a system without computers and networks"""
 
@@ -104,7 +107,7 @@ class ScheduleTrace:
             if sender == NONE:
                 sent[name] = offsets
         return PeriodicSchedule(
-            period=period, samples=samples, numbers=numbers, sent=sent, transit_times=transit_times,
+            period=period, begin=begin, samples=samples, numbers=numbers, sent=sent, transit_times=transit_times,
             with_own_delay=released,
         )  # fmt: skip
 
@@ -160,6 +163,50 @@ def periodic_schedule(
             with errors_name_overload(system):
                 raise UsageError(windows.failure_text())
         count *= 2
+
+
+def common_period(system: System, most: int) -> Fraction | None:
+    """After how long the periods of a system and the schedule of its computers and networks repeat [ns].
+
+    None: the periods of sampled components do not soon. Raises `UsageError` for a schedule that does not within `most`
+    of the longest.
+    """
+    own = hyperperiod_of(system)
+    if own is None or not system.uses_scheduler:
+        return own
+    found = hyperperiod([own, NANOSECONDS * periodic_schedule(system).period])
+    if found > (limit := most * longest_period(system)):
+        raise UsageError(
+            f"computers and networks: their schedule repeats after {quantity(float(found) / NANOSECONDS, 's')}, which "
+            f"is more than {most} of the longest period that a component has: expected periods that have more in common"
+            f"{_one_that_repeats(system, limit)}"
+        )
+    return found
+
+
+def _one_that_repeats(system: System, limit: Fraction) -> str:
+    """The period by whose least change all of them repeat within a limit [ns], in words; empty: none alone."""
+    named = {f"{each.place}.period": each.task.period for each in placed_tasks(system.computers)}
+    named |= {f"{each.place}.period": each.message.period for each in placed_messages(system.networks)}
+    shared = [period for _, period in instants(system)] + periods_of(system)
+    found = list[tuple[Fraction, str, Fraction]]()
+    for path, period in named.items():
+        own = exact_nanoseconds(period or 0.0)
+        if own not in shared:
+            continue
+        others = hyperperiod([each for k, each in enumerate(shared) if k != shared.index(own)])
+        for most in range(1, MOST_PARTS + 1):
+            ratio = (own / others).limit_denominator(most)
+            if ratio and others * ratio.numerator <= limit and (others * ratio).denominator == 1:
+                found.append((abs(others * ratio / own - 1), path, others * ratio))
+    if not found:
+        return ""
+    _, path, nearest = min(found)
+    return f", as {path} = {float(nearest) / NANOSECONDS:.12g}"
+
+
+MOST_PARTS = 10
+"""Parts of the period of all others, of which a period may be some so that it is proposed"""
 
 
 def instants(system: System) -> list[tuple[Fraction, Fraction]]:

@@ -34,7 +34,7 @@ from orchestration.theory.stability.loop_at_rest import (
     wrapping_loader,
     written_in,
 )
-from orchestration.theory.stability.periodic_schedule import periodic_schedule
+from orchestration.theory.stability.periodic_schedule import common_period
 
 LARGE, SMALL = 1e3, 1e-7
 """Factors on the initial difference: sizes between which it is followed, linear and above rounding"""
@@ -105,12 +105,8 @@ def repeating_period(nominal: System) -> Fraction | None:
 
     None: they are not known to, within `LONGEST_SCHEDULE`.
     """
-    own = operating_point.hyperperiod_of(nominal)
-    if own is None or not nominal.uses_scheduler:
-        return own
     with suppress(UsageError):
-        found = operating_point.hyperperiod([own, NANOSECONDS * periodic_schedule(nominal).period])
-        return found if found <= LONGEST_SCHEDULE * operating_point.longest_period(nominal) else None
+        return common_period(nominal, LONGEST_SCHEDULE)
     return None
 
 

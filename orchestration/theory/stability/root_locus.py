@@ -28,7 +28,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.request import errors_in_own_terms
 from orchestration.theory.stability.delay_margin import MOST_JUMPS, SIDES, apart_of
-from orchestration.theory.stability.fixed_periods import in_fixed_periods
+from orchestration.theory.stability.fixed_periods import in_repeated_periods
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested, warned_of_timing
 from orchestration.theory.stability.loop_at_rest import KnownTangents, Start, keep_start, whole_at_rest
@@ -388,15 +388,15 @@ def _root_locus(varied: Varied, span: Range, count: int | None) -> RootLocus:
 def _beside_jumps(varied: Varied, system: System, values: list[float]) -> list[float]:
     """The values, and those to both sides of each jump between them, of a delay to a sampled component."""
     found, (first, last) = set(values), (values[0] * NANOSECONDS, values[-1] * NANOSECONDS)
-    calm = in_fixed_periods(system)
+    calm = in_repeated_periods(system)
     for own, x in zip(system.connections, calm.connections):
         apart = apart_of(calm, x) if f"connections.{x.name}.delay" in varied.paths else None
-        if apart is None or last - first > MOST_JUMPS * apart.interval:
+        if apart is None or (last - first) * len(apart.delays) > MOST_JUMPS * apart.interval:
             continue
         before = exact_nanoseconds(lowest(x.delay)) - exact_nanoseconds(lowest(own.delay))
-        least = (apart.first - before) % apart.interval
-        counts = range(math.floor((last - least) / apart.interval) + 1)
-        jumps = (float(least + k * apart.interval) / NANOSECONDS for k in counts)
+        least = [(each - before) % apart.interval for each in apart.delays]
+        counts = range(math.floor(last / apart.interval) + 1)
+        jumps = (float(each + k * apart.interval) / NANOSECONDS for each in least for k in counts)
         sides = (round(jump + side, 9) for jump in jumps for side in SIDES)
         found.update(side for side in sides if values[0] <= side <= values[-1])
     return sorted(found)

@@ -15,7 +15,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.theory.exact.expect import expect
-from orchestration.theory.stability.fixed_periods import in_fixed_periods
+from orchestration.theory.stability.fixed_periods import in_repeated_periods
 from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start
 from orchestration.theory.stability.period_map import growth_of_loop
 from orchestration.theory.stability.perturbed_runs import growth_of
@@ -112,7 +112,7 @@ def test_a_law_that_begins_anew_settles_for_as_long_as_a_run_does(tmp_path: Path
         keep_start(system, instances, known)
         assert known.start is not None
         known.start = dataclasses.replace(known.start, tunable=frozenset())
-        begun = known.start.tuned_to(in_fixed_periods(wanted))
+        begun = known.start.tuned_to(in_repeated_periods(wanted))
         assert begun is not None
         assert list(begun.saved) == ["servo"]
         found = growth_of_loop(wanted, instances, known=known)
