@@ -6,7 +6,7 @@ from orchestration.command.flags import AsSimulated, FlightFlags, ScenarioFile, 
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.interrupt import Interrupted
-from orchestration.foundation.basics.terminal import in_columns, warn
+from orchestration.foundation.basics.terminal import in_columns, inform, warn
 
 if TYPE_CHECKING:
     from orchestration.systems.system.request import Request
@@ -35,15 +35,17 @@ def warn_if_means_are_infinite(request: "Request") -> None:
     """Warn, after a run, if averages over runs have no finite expectation."""
     from orchestration.systems.system.files import files_of
     from orchestration.systems.system.request import system_of
-    from orchestration.theory.exact.mean_square import infinite_means_in_words, mean_squares, objectives_of_means
+    from orchestration.theory.exact import mean_square
 
     system = system_of(request)
     try:
-        (radius,) = mean_squares(request, [system], files_of(system)).radii
+        (found,) = mean_square.mean_squares(request, [system], files_of(system))
     except KeyboardInterrupt:
         raise Interrupted("with the result printed, but means of squares not examined") from None
-    if radius is not None and radius >= 1.0:
-        warn(infinite_means_in_words(objectives_of_means(system), "", radius))
+    if found.remark == mean_square.NO_EXPECTATION:
+        warn(mean_square.infinite_means_in_words(mean_square.objectives_of_means(system), "", found.radius))
+    if found.remark == mean_square.NOT_EXAMINED + mean_square.LONG_HYPERPERIOD:
+        inform(f"means of squares {found.remark}")
 
 
 def _lines(expected: "Expected") -> list[str]:

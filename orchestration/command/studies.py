@@ -175,23 +175,26 @@ def _sweep_command(study: Path, out: Path | None) -> str:
 def _current_store(study: Path, out: Path | None, *, mean: bool) -> Path:
     """The store of a study file that has not changed since its runs; warns if some are missing.
 
-    Of a `mean` it warns, too, if it was not examined which means of squares are finite, as a sweep does at its end.
+    Of a `mean` it says, too, which means of squares are not finite, as a sweep does at its end.
     """
-    from orchestration.experiments.studies.infinite_means import INFINITE
+    from orchestration.experiments.studies.infinite_means import INFINITE, InfiniteMeans
     from orchestration.experiments.studies.store import open_for_reading, store_path
     from orchestration.experiments.studies.study_file import load_study
     from orchestration.experiments.studies.sweep import expect_current
+    from orchestration.experiments.studies.table import units_in
 
     loaded = load_study(study)
     path = store_path(loaded.name, out)
     with open_for_reading(path) as opened:
         expect_current(opened, loaded)
         there, total = sum(opened.counts().values()), len(loaded.points)
-        outcomes, examined = opened.outcomes(), opened.about().get(INFINITE) != ""
+        outcomes, examined = opened.outcomes(), opened.about().get(INFINITE)
     if there < total:
         warn(f"{path}: {there} of {total} runs; the others are missing, {_sweep_command(study, out)} runs them")
     elif mean and not examined:
         warn(f"{path}: which means of squares are finite is not yet examined; {_sweep_command(study, out)} does")
+    elif mean:
+        InfiniteMeans.in_store(path, loaded).tell(loaded, units_in(path))
     _tell_if_undecided(loaded, outcomes)
     return path
 

@@ -14,14 +14,16 @@ from orchestration.experiments.studies.shares import (
     INTERVALS,
     MEAN,
     MEDIAN,
-    NO_EXPECTATION,
     REMARK,
     WITH_VALUE,
+    WITHOUT_INTERVAL,
     cells_of,
     differences_in,
     expect_mean,
+    is_unknown,
     laws_of,
     left_out,
+    remarked,
     with_chance,
 )
 from orchestration.experiments.studies.study import Study
@@ -36,6 +38,7 @@ from orchestration.experiments.studies.table import (
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.simulation.results import display_names as labels
 from orchestration.systems.system.requirements import is_number
+from orchestration.theory.exact.mean_square import NO_EXPECTATION
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,7 +60,7 @@ def study_table(
         expect_mean(metric, study.repeat)
     chosen = picked(study.cell_axes, at)
     axes = [axis for axis in study.cell_axes if axis.name not in chosen]
-    rows = with_chance(rows_at(frame(store), chosen), study, InfiniteMeans.in_store(store))
+    rows = with_chance(rows_at(frame(store), chosen), study, InfiniteMeans.in_store(store, study))
     names = [axis.name for axis in axes]
     if not axes:
         raise UsageError("--at: expected an axis besides, for a table of cells")
@@ -87,6 +90,8 @@ def study_table(
         caption += f"value, with 95 % intervals {INTERVALS[average]} and, in parentheses, their number"
         if absent := left_out(cells, word):
             caption += f"; {absent}"
+        if remarks := remarked(cells, "?: "):
+            caption += f"; {remarks}"
     if laws is None:
         columns[f"share {word}" if is_share else average] = texts(cells)
     else:
@@ -112,7 +117,7 @@ def study_table(
         caption += f"; {meaning}"
     if chosen:
         caption += f"; at {place_of(study.axes, chosen, units)}"
-    without = cells[REMARK].eq(NO_EXPECTATION) if mean else cells["count"].isna()
+    without = cells[REMARK].isin(WITHOUT_INTERVAL) if mean else cells["count"].isna()
     if (cells["low"].isna() & ~without).any():
         caption += "; no interval where nothing is random" + ("" if is_share else ", or runs are too few")
     table = cells
@@ -131,9 +136,11 @@ def _texts(table: "pd.DataFrame", column: str, decimals: int) -> list[str]:
 def _averages(table: "pd.DataFrame", column: str, count: str) -> list[str]:
     """Averages with their intervals and the number of runs, of all if some are left out; a dash for a missing cell."""
     rows = zip(*(table[name] for name in (column, "low", "high", count, "count" if count == WITH_VALUE else count)))
-    remarks = table[REMARK] if REMARK in table else [""] * len(table)
+    remarks = [""] * len(table)
+    if REMARK in table:
+        remarks = ["?" if doubt else said for doubt, said in zip(is_unknown(table[REMARK]), table[REMARK])]
     return [
-        f"{remark if remark == NO_EXPECTATION else to_digits(value, low, high, DIGITS)} "
+        f"{remark if remark == NO_EXPECTATION else to_digits(value, low, high, DIGITS)}{'?' * (remark == '?')} "
         f"({number:.0f}{f' of {of:.0f}' if number < of else ''})"
         if of > 0
         else "-"

@@ -170,11 +170,12 @@ def _summary_of_other(name: str, stored: Stored, study: Study | None) -> str:
 
 
 def _on_means(stored: Stored, study: Study | None) -> str:
-    """Where averages over runs have no finite expectation, in a sentence; empty if nowhere, or it is not known."""
+    """What is to be said of averages over runs, and what is not known of them, in sentences."""
     if study is None or not stored.about.get(INFINITE):
         return ""
-    warning = InfiniteMeans.from_text(stored.about[INFINITE]).warning(study, stored.units)
-    return f" Mind {warning}." if warning else ""
+    means = InfiniteMeans.from_text(stored.about[INFINITE])
+    warnings = (f" Mind {text}." for text in means.warnings(study, stored.units))
+    return "".join([*warnings, *(f" {text[0].upper()}{text[1:]}." for text in means.notes(study, stored.units))])
 
 
 def _overall(stored: Stored, study: Study | None) -> ReportShare:

@@ -22,27 +22,31 @@ from orchestration.experiments.studies.shares import (
     INTERVALS,
     MEAN,
     MEDIAN,
-    NO_EXPECTATION,
     REMARK,
     WITH_VALUE,
     averages_of,
+    is_unknown,
     judged_by,
     left_out,
+    remarked,
     shares_of,
 )
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.lines import abreast
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS
 from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.theory.exact.mean_square import NO_EXPECTATION
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ROW = 0.05
 """Share of the height of a panel that a row of numbers takes"""
-_NO_VALUE, _SOME = "no value", "some runs left out"
+_NO_VALUE, _SOME, _UNKNOWN = "no value", "some runs left out", "not examined"
 INFINITY: Any = {"marker": r"$\infty$", "markersize": 7.0, "markeredgewidth": 0.0}
 """Mark of a mean without a finite expectation"""
+QUESTION: Any = {"marker": "$?$", "markersize": 6.0, "markeredgewidth": 0.0}
+"""Mark of a mean whose expectation is not known to be finite, in the legend"""
 HOLLOW: Any = {"markersize": 3.5, "markerfacecolor": "white", "zorder": 3}
 
 
@@ -61,8 +65,8 @@ def cell_lines(
 
     `laws` is an axis of names, such as controllers: a line for each. A mark is hollow where some runs are left out;
     crosses at the lower edge are values without an average, and signs of infinity at the upper one means without a
-    finite expectation, which are not drawn. The numbers of runs averaged stand at the upper edge, in a
-    row for each line, where there is room.
+    finite expectation, which are not drawn. A question mark is beside one that may have none. The numbers of runs
+    averaged stand at the upper edge, in a row for each line, where there is room.
     """
     across = quantity_of(axis, units)
     figure = style.figure(32.0)
@@ -74,13 +78,17 @@ def cell_lines(
     groups = groups_along(shown, laws, units)
     lacking: dict[str | tuple[float, ...], Floats] = {}
     without: dict[str | tuple[float, ...], Floats] = {}
-    lacks, numbers, hollow = [], {}, False
+    lacks, numbers, hollow, unknown = [], {}, False, False
     for i, (law, group) in enumerate(groups):
         how: dict[str, Any] = {"color": CYCLE[i % len(CYCLE)] if law else BLUE, "linestyle": DASHES[i % len(DASHES)]}
         at = across.of(group[axis.name])
         if REMARK in group and (infinite := group[REMARK] == NO_EXPECTATION).any():
             without[how["color"]] = at[infinite]
             group = group.assign(**{column: group[column].mask(infinite)})
+        if REMARK in group and (doubtful := group[is_unknown(group[REMARK])])[column].notna().any():
+            unknown = True
+            for place in zip(across.of(doubtful[axis.name]), doubtful[column]):
+                panel.annotate("?", place, (4.0, 3.0), textcoords="offset points", color=how["color"])
         panel.plot(at, group[column], marker=MARKS[i % len(MARKS)], markersize=3.5, label=law, **how)
         if metric != GOOD:  # too few runs have no interval, and a band of one place would not be seen
             ends = np.abs(group[["low", "high"]].to_numpy().T - group[column].to_numpy())
@@ -108,20 +116,23 @@ def cell_lines(
     if without:
         mark_edge(panel, without, beside=taken, **INFINITY)
         panel.plot([], [], linestyle="", **INFINITY, color=BLACK if laws else BLUE, label=NO_EXPECTATION)
+    if unknown:
+        panel.plot([], [], linestyle="", **QUESTION, color=BLACK if laws else BLUE, label=_UNKNOWN)
     if lacking:
         mark_edge(panel, lacking, marker="x", low=True)
         panel.plot([], [], "x", color=BLACK if laws else BLUE, markersize=4, label=_NO_VALUE)
     if hollow:
         panel.plot([], [], "o", color=BLACK if laws else BLUE, label=_SOME, **HOLLOW)
-    if laws is not None or without or lacking or hollow:
+    if laws is not None or without or unknown or lacking or hollow:
         names = [law for law, _ in groups]
-        names += [NO_EXPECTATION] * bool(without) + [_NO_VALUE] * bool(lacking) + [_SOME] * bool(hollow)
+        there = {NO_EXPECTATION: without, _UNKNOWN: unknown, _NO_VALUE: lacking, _SOME: hollow}
+        names += [name for name, some in there.items() if some]
         title = None if laws is None else name_of(laws)
         figure.legend(loc="outside lower center", title=title, ncols=abreast(names, style))
     said = [repetitions(found, metric)]
     if metric != GOOD:
         said += [f"bars: 95 % intervals {INTERVALS[average]}, where runs suffice"] if said[0] else []
-        said.append(left_out(shown, words[0]))
+        said += [left_out(shown, words[0]), remarked(shown)]
     good = "" if average == MEAN else f"{words[0]} "
     said += [f"crosses: no {good}run with a value {' and '.join(lacks)}"] if lacks else []
     style.set_title(figure, "; ".join(filter(None, said)))

@@ -30,14 +30,16 @@ from orchestration.experiments.studies.shares import (
     GOOD,
     MEAN,
     MEDIAN,
-    NO_EXPECTATION,
     REMARK,
     WITH_VALUE,
     TwoLaws,
     averages_of,
+    cells_in_words,
     differences_in,
+    is_unknown,
     judged_by,
     left_out,
+    remarked,
     shares_of,
 )
 from orchestration.foundation.basics.simulator import Floats
@@ -47,6 +49,7 @@ from orchestration.simulation.figures.shades import inner
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.quantities import Quantity
+from orchestration.theory.exact.mean_square import NO_EXPECTATION
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,7 +78,7 @@ def cell_maps(
     There is a panel for each value of the `third` axis, numbers or names, such as controllers; and for two names one of
     their difference, with dots where its interval at 95 % excludes 0: of shares, or of a metric in the pairs of runs
     that are both averaged. Of means half of the runs have a value at the line; those without a finite expectation are
-    hatched, without a colour, and left out of the range of the others.
+    hatched, without a colour, and left out of the range of the others; those of which this is not known are dotted.
     """
     x, y = (_Cells(axis, quantity_of(axis, units)) for axis in axes)
     places = (x.edges, y.edges)
@@ -85,8 +88,9 @@ def cell_maps(
     if metric != GOOD:
         averages = found[names].merge(averages_of(table, names, metric, average), on=names)
         found["value"], found[WITH_VALUE], found["of"] = averages[average], averages[WITH_VALUE], averages["count"]
-        absent = left_out(averages, words[0])
+        absent = "; ".join(filter(None, (left_out(averages, words[0]), remarked(averages))))
     found["without"] = averages[REMARK].eq(NO_EXPECTATION) if average == MEAN else False
+    found["unknown"] = is_unknown(averages[REMARK]) if average == MEAN else False
     found["value"] = found["value"].mask(found["without"])
     groups = groups_along(found, third, units)
     both = _two_laws(third)
@@ -98,7 +102,9 @@ def cell_maps(
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for panel in panels[count:]:
         panel.set_visible(False)
-    grids = [{name: _grid(group, axes, name) for name in ("value", "share", "without")} for _, group in groups]
+    grids = [
+        {name: _grid(group, axes, name) for name in ("value", "share", "without", "unknown")} for _, group in groups
+    ]
     everything = np.array([0.0, 1.0]) if metric == GOOD else np.stack([grid["value"] for grid in grids])
     letters = letters_of(style, columns)
     room, most = letters / (len(places[0]) - 1), found["count"].max()
@@ -108,6 +114,7 @@ def cell_maps(
         filled = mesh.fill(panel, *places, grid["value"], of=everything)
         mesh.hatch(panel, *places, np.isnan(grid["share"]))
         mesh.hatch(panel, *places, grid["without"] > 0.0, mesh.NO_MEAN)
+        mesh.hatch(panel, *places, grid["unknown"] > 0.0, mesh.UNKNOWN)
         _limit(panel, places, grid["share"])
         if metric == GOOD and writes:
             at, up = (quantity.of(group[axis.name]) for quantity, axis in zip((x, y), axes))
@@ -123,7 +130,7 @@ def cell_maps(
     numbered = writes and repeats and not (metric == GOOD and has_room[OF_ALL])
     title = title_of(metric, words, units, average, numbered=numbered, repeats=repeats)
     if found["without"].any():
-        title += f",\n{found['without'].sum()} cells without a finite expectation left out"
+        title += f",\n{cells_in_words(found['without'].sum())} without a finite expectation left out"
     mesh.color_bar(panels[: len(groups)].tolist(), filled, everything, title, location="bottom", aspect=40.0)
     if both is not None:
         of_pairs, of = differences_in(table, names, both, metric, average), "difference of the shares"
@@ -164,6 +171,8 @@ def cell_maps(
         handles.append(mesh.hatched())
     if found["without"].any():
         handles.append(mesh.hatched(NO_EXPECTATION, mesh.NO_MEAN))
+    if found["unknown"].any():
+        handles.append(mesh.hatched("not examined", mesh.UNKNOWN))
     if both is not None and unpaired:
         handles.append(mesh.hatched("no pairs", mesh.NO_PAIRS))
     if handles:
@@ -246,6 +255,9 @@ def _difference(
     found = found.assign(without=found[REMARK].eq(NO_EXPECTATION) if REMARK in found else False)
     without = _grid(found, axes, "without") > 0.0
     mesh.hatch(panel, *places, without, mesh.NO_MEAN)
+    if REMARK in found:
+        found["unknown"] = is_unknown(found[REMARK])
+        mesh.hatch(panel, *places, _grid(found, axes, "unknown") > 0.0, mesh.UNKNOWN)
     found["difference"] = found["difference"].mask(found["without"])
     difference = _grid(found, axes, "difference")
     known = np.sort(np.abs(difference[np.isfinite(difference)]))

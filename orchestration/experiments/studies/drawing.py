@@ -99,7 +99,7 @@ def study_figures(
             drawn = {f"sensitivity_{metric}": figures.sensitivity_bars(indices, metric, style)}
         else:
             axes = tuple(axis for axis in study.cell_axes if axis.name not in at)
-            infinite = InfiniteMeans.in_store(store) if mean else None
+            infinite = InfiniteMeans.in_store(store, study) if mean else None
             drawn = _over_axes(study, axes, table, metric, units, style, MEAN if mean else MEDIAN, infinite)
         meaning = "" if study.repeat is None or mean else meaning_of(study, metric, units)
         notes = [place_of(study.axes, at, units), meaning]

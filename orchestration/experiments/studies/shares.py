@@ -10,6 +10,7 @@ from orchestration.experiments.studies.infinite_means import InfiniteMeans
 from orchestration.experiments.studies.study import Study
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.statistics import mean, pair_correlation, quantile, wilson
+from orchestration.theory.exact.mean_square import NO_EXPECTATION, NO_VARIANCE, NOT_EXAMINED, VARIANCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,10 +29,13 @@ PLACE = "place"
 """Column of one value, by which runs over laws alone are one group"""
 RANDOM = "random"
 """Column of a table of runs: whether the repetitions of a run may differ from it by chance"""
-WITHOUT = "without a finite expectation"
-"""Column of a table of runs: the metrics whose mean has no finite expectation, in a tuple"""
-REMARK, NO_EXPECTATION = "remark", "no finite expectation"
-"""Column of means: why they have no interval, and what it says of such a mean; else empty"""
+REMARKS = "remarks"
+"""Column of a table of runs: remarks on means of metrics, by metric"""
+REMARK = "remark"
+"""Column of means: whether they have no finite expectation or variance, and hence no interval, or whether it is not
+known; else empty"""
+WITHOUT_INTERVAL = (NO_EXPECTATION, NO_VARIANCE)
+"""Remarks on means that have no interval, the graver first"""
 PAIR = "paired by"
 """Column of a table of runs: what runs of two cells that belong together have in common, as the seed"""
 
@@ -45,9 +49,8 @@ class TwoLaws(NamedTuple):
 
 
 def with_chance(table: "pd.DataFrame", study: Study, infinite: InfiniteMeans | None = None) -> "pd.DataFrame":
-    """The table of the runs of `study` with the columns `RANDOM`, `PAIR` and `WITHOUT`.
+    """The table of the runs of `study` with the columns `RANDOM`, `PAIR` and `REMARKS`, which are those of `infinite`.
 
-    `WITHOUT` has metrics at the points of `infinite`.
     `RANDOM` is false in a cell whose system does not depend on the seed, if only the seed is repeated.
     """
     starts = study.files().start_values if study.needs_start_values else {}
@@ -58,8 +61,8 @@ def with_chance(table: "pd.DataFrame", study: Study, infinite: InfiniteMeans | N
 
     cells = table.groupby([axis.name for axis in study.cell_axes], dropna=False)["design_index"]
     repeated = 0 if study.repeat is None else table[study.repeat]
-    without: Any = "" if infinite is None else infinite.column(table)
-    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool), PAIR: repeated, WITHOUT: without})
+    remarks = [{}] * len(table) if infinite is None else infinite.column(table)
+    return table.assign(**{RANDOM: cells.transform(is_random).astype(bool), PAIR: repeated, REMARKS: remarks})
 
 
 def judged_by(table: "pd.DataFrame", metric: str) -> "pd.DataFrame":
@@ -188,7 +191,8 @@ def averages_of(table: "pd.DataFrame", by: Sequence[str], metric: str, average: 
     Columns: the axes `by`, `count` of runs, also failed ones, `diverged` and `good` of them (for the mean those that
     have it), `with_value`, the number of those averaged, `median` or `mean`, and the ends of its interval at 95 %, of
     order statistics or Student's t, nan where there are too few runs, and where nothing is random, which is one run;
-    of means `remark`, which says where they have no finite expectation, and no interval.
+    of means `remark`, which says where they have no finite expectation or variance, and no interval, and where this is
+    not known.
     """
     import pandas as pd
 
@@ -218,6 +222,30 @@ def left_out(averages: "pd.DataFrame", word: str) -> str:
     return f"{missing} of {count} runs left out ({why}){which}" if missing else ""
 
 
+def remarked(averages: "pd.DataFrame", sign: str = "") -> str:
+    """What a caption says of means without an interval, and of those of which too little is known; empty without such.
+
+    Those without a finite expectation say so themselves. `sign` marks means that are not examined.
+    """
+    remarks = averages[REMARK] if REMARK in averages else averages["count"].iloc[:0].astype(str)
+    wide, unknown = (int(remarks.eq(remark).sum()) for remark in (NO_VARIANCE, VARIANCE))
+    said = [f"{cells_in_words(wide)} without an interval: {NO_VARIANCE}"] if wide else []
+    said += [f"of {cells_in_words(unknown)} the {VARIANCE}"] if unknown else []
+    if reasons := sorted({*remarks[is_unknown(remarks)]}):
+        said.append(f"{sign}{reasons[0]}" + (" and other reasons" if reasons[1:] else ""))
+    return "; ".join(said)
+
+
+def cells_in_words(number: int) -> str:
+    """A number of cells."""
+    return f"{number} cell{'s' if number != 1 else ''}"
+
+
+def is_unknown(remarks: "pd.Series") -> "pd.Series":
+    """Whether remarks say that it is not known whether a mean is finite."""
+    return remarks.astype(str).str.startswith(NOT_EXAMINED)
+
+
 def _average(values: "pd.Series", average: str, *, is_random: bool) -> tuple[int, float, float, float]:
     """The number of values, their median or mean, and the ends of its interval at 95 %."""
     if not len(values):
@@ -234,31 +262,34 @@ def differences_of_averages(
 
     Pairs are those in which both are good, for the mean those in which both have the metric. Columns: the other axes,
     `pairs`, their number, `difference`, and its interval at 95 %, `low` and `high`, nan where there are too few pairs,
-    and where nothing is random, which is one pair; of means `remark`, if one of both has no finite expectation.
+    and where nothing is random, which is one pair; of means `remark`, that of one of both.
     """
     import pandas as pd
 
     others = [name for name in by if name != laws.axis]
     judged = table if average == MEDIAN else judged_by(table, metric)
     good = _judged(judged).query(GOOD).dropna(subset=[metric])
-    columns, rows = [*others, PAIR, metric, RANDOM, WITHOUT], []
+    columns, rows = [*others, PAIR, metric, RANDOM, REMARKS], []
     one, other = (good.loc[good[laws.axis] == law, columns] for law in (laws.second, laws.first))
     for key, both in one.merge(other, on=[*others, PAIR], suffixes=("", ".other")).groupby(others, sort=False):
         is_random = bool((both[RANDOM] | both[f"{RANDOM}.other"]).any())
-        remark = _remark(both, metric) or _remark(both, metric, f"{WITHOUT}.other")
+        remark = _remark(both, metric, REMARKS, f"{REMARKS}.other")
         rows.append((*key, *_average(both[metric] - both[f"{metric}.other"], average, is_random=is_random), remark))
     return _with_remarks(pd.DataFrame(rows, columns=[*others, "pairs", "difference", "low", "high", REMARK]), average)
 
 
-def _remark(cell: "pd.DataFrame", metric: str, column: str = WITHOUT) -> str:
-    return NO_EXPECTATION if any(metric in each for each in cell[column]) else ""
+def _remark(cell: "pd.DataFrame", metric: str, *columns: str) -> str:
+    """The gravest remark on a metric of the runs of a cell."""
+    found: set[str] = {each.get(metric, "") for column in columns or (REMARKS,) for each in cell[column]}
+    gravest = [*WITHOUT_INTERVAL, *sorted(found - {*WITHOUT_INTERVAL, ""}), ""]
+    return next((remark for remark in gravest if remark in found), "")
 
 
 def _with_remarks(cells: "pd.DataFrame", average: str) -> "pd.DataFrame":
     """The cells without intervals where a remark says so; medians always have one, and no remarks."""
     if average == MEDIAN:
         return cells.drop(columns=REMARK)
-    cells.loc[cells[REMARK] != "", ["low", "high"]] = math.nan
+    cells.loc[cells[REMARK].isin(WITHOUT_INTERVAL), ["low", "high"]] = math.nan
     return cells
 
 

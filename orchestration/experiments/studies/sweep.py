@@ -22,7 +22,7 @@ from orchestration.experiments.studies.swept import Swept
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
-from orchestration.foundation.basics.terminal import CountProgress, inform, runs_reporter, warn
+from orchestration.foundation.basics.terminal import CountProgress, inform, runs_reporter
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
@@ -95,8 +95,8 @@ def sweep(
             )  # fmt: skip
             flown, agreement = run_missing(opened, flight, report, announce, retry_failed=retry_failed)
         infinite = _infinite_means(opened, columns)
-        if announce is not None and (warning := infinite.warning(study, json.loads(opened.about()[UNITS]))):
-            warn(warning)
+        if announce is not None:
+            infinite.tell(study, json.loads(opened.about()[UNITS]), announce)
         failed, engines = opened.counts().get("failed", 0), opened.engines()
     return Swept(
         study=study, total=len(study.points), flown=flown, failed=failed, path=path, engine=execution.name,

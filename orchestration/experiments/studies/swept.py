@@ -45,7 +45,8 @@ class Swept:
     """The references of its runs and the components that follow them."""
 
     infinite_means: InfiniteMeans | None = None
-    """The points at which averages over runs have no finite expectation; their means have no intervals."""
+    """The points at which averages over runs have no finite expectation or variance, and hence no intervals, and those
+    at which it is not known."""
 
     @property
     def verdict(self) -> str:

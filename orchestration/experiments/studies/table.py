@@ -160,7 +160,7 @@ def export(
     rows = frame(path) if rows is None else rows
     tables, units = {"runs": rows}, units_in(path)
     if study is not None and study.cell_names is not None:
-        cells, repeated = study.cell_names, shares.with_chance(rows, study, InfiniteMeans.in_store(path))
+        cells, repeated = study.cell_names, shares.with_chance(rows, study, InfiniteMeans.in_store(path, study))
         laws = shares.laws_of(rows, cells)
         judged = (shares.GOOD,) if study.origin.criterion.good is not None else ()
         for name in dict.fromkeys((*judged, *filter(None, (metric,)))):

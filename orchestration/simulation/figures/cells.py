@@ -19,8 +19,8 @@ LIMIT = {"colors": RED, "linewidths": 1.8}
 """Style of the line between good and other cells"""
 FEW = 6
 """Most values of an axis that all have a tick"""
-MISSING, NO_PAIRS, NO_MEAN = "////", "xxx", r"\\\\"
-"""Hatches of cells without a run, without a pair of runs, and without a finite expectation"""
+MISSING, NO_PAIRS, NO_MEAN, UNKNOWN = "////", "xxx", r"\\\\", ".."
+"""Hatches of cells without a run, without a pair of runs, without a finite expectation, and where none is known"""
 _HATCHED: Mapping[str, Any] = {"facecolor": "none", "edgecolor": GREY, "linewidth": 0.0}
 
 

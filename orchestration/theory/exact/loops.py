@@ -164,12 +164,16 @@ class Loops:
 
     def radius(self, system: System, *, agree: float) -> float:
         """The mean-square radius alone, as `solve` has it."""
+        return self.jump_linear(system, agree=agree).radius
+
+    def jump_linear(self, system: System, *, agree: float) -> JumpLinear:
+        """The loop without costs, by as fine a rule as its radius needs."""
         system = at_operating_point(system)
         linear = self.linear(system)
 
-        def answer(chain: TimingChain) -> tuple[float, Floats]:
-            radius = JumpLinear(*chain.stages()).radius
-            return radius, np.array([radius])
+        def answer(chain: TimingChain) -> tuple[JumpLinear, Floats]:
+            loop = JumpLinear(*chain.stages())
+            return loop, np.array([loop.radius])
 
         effects = self._effects(system, linear, ())
         return self._refined(self._tasks_and_links(system, linear, effects), effects, answer, agree).result

@@ -12,13 +12,15 @@ from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Range, ends_of_good
 from orchestration.foundation.basics.errors import QuadcosimError, SimulatorError, UsageError, prefixed, told_apart
 from orchestration.foundation.basics.terminal import inform, progress_bar
+from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import at_operating_point, changed
 from orchestration.systems.system.request import Request
 from orchestration.theory.exact.loops import Loops, linearised_as
-from orchestration.theory.exact.objectives import inlined_objectives, means_of
+from orchestration.theory.exact.moments import JumpLinear
+from orchestration.theory.exact.objectives import has_mean_of_squares, inlined_objectives, means_of
 from orchestration.theory.stability.known_loops import LOOPS, LinearLimit, rested
 from orchestration.theory.stability.operating_point import hyperperiod, periods_of
 from orchestration.theory.stability.sign_changes import zero_between
@@ -71,24 +73,28 @@ MAX_LINEARISED = 50
 """systems that are linearised: others are examined that differ from them in random times alone"""
 MAX_SAMPLES = 250
 """Samples in the hyperperiod of a system that is examined; more take long if a plant is in Python"""
+MAX_FOURTH_WORK = 3e8
+"""Products, in about a second, by which it is examined whether a mean has a variance"""
+NO_EXPECTATION, NO_VARIANCE = "no finite expectation", "no finite variance"
+"""Remarks on means of squares: second moments, or fourth ones, grow without bound"""
+NOT_EXAMINED, VARIANCE = "not examined: ", "variance not examined: too many fourth moments"
+"""Beginning of a remark that states why it is not known whether means are finite; remark where variances may not be"""
+LONG_HYPERPERIOD = f"a hyperperiod of more than {MAX_SAMPLES} samples; quadcosim expect does, or says why not"
+TOO_MANY = f"more than {MAX_LINEARISED} systems that differ in more than delays, losses and jitter"
 
 
+@passable
 @dataclass(frozen=True, kw_only=True)
 class MeanSquares:
-    """Whether means of squares have a finite expectation in some systems."""
+    """Whether means of squares have a finite expectation in a system."""
 
-    radii: Sequence[float | None]
-    """Mean-square radii by system; None: none is examined, or none is known"""
-    left_out: int
-    """number of systems that were too many, or have too long a hyperperiod, to be examined"""
-
-    @property
-    def infinite(self) -> list[int]:
-        """The places of systems where they have none."""
-        return [place for place, radius in enumerate(self.radii) if radius is not None and radius >= 1.0]
+    remark: str = ""
+    """Empty: they have one, and a finite variance, or nothing is random"""
+    radius: float = 0.0
+    """The growth factor that is 1 or more, of second or fourth moments; else 0"""
 
 
-def mean_squares(request: Request, systems: Sequence[System], files: Files) -> MeanSquares:
+def mean_squares(request: Request, systems: Sequence[System], files: Files) -> list[MeanSquares]:
     """Examine the means of squares of these systems.
 
     Examined are systems with something random and an objective that is a mean of squares, unless their kind has its
@@ -99,27 +105,29 @@ def mean_squares(request: Request, systems: Sequence[System], files: Files) -> M
         if system.depends_on_seed and objectives_of_means(system):
             places.setdefault(replace(system, seed=0).to_toml(), []).append(place)
     chosen = {key: replace(systems[alike[0]], seed=0) for key, alike in places.items()}
-    samples = {key: _samples_in_hyperperiod(system) for key, system in chosen.items()}
-    linear = {key: _linearised_as(chosen[key]) for key, number in samples.items() if number <= MAX_SAMPLES}
+    linear = {key: _linearised_as(one) for key, one in chosen.items() if _samples_in_hyperperiod(one) <= MAX_SAMPLES}
     first = {*list(dict.fromkeys(linear.values()))[:MAX_LINEARISED]}
     keys = [key for key in linear if linear[key] in first]
-    radii: list[float | None] = [None] * len(systems)
-    with suppress(QuadcosimError):
-        examined, files = _with_twins([chosen[key] for key in keys], files)
+    reasons = {key: TOO_MANY if key in linear else LONG_HYPERPERIOD for key in chosen}
+    remarks = {key: MeanSquares(remark=f"{NOT_EXAMINED}{reason}") for key, reason in reasons.items()}
+    remarks |= zip(keys, _examined([chosen[key] for key in keys], files))
+    found = [MeanSquares()] * len(systems)
+    for key, remark in remarks.items():
+        for place in places[key]:
+            found[place] = remark
+    return found
+
+
+def _examined(systems: Sequence[System], files: Files) -> Sequence[MeanSquares]:
+    try:
+        systems, files = _with_twins(systems, files)
         began = time.monotonic()
-        found = isolated_call(files.fmus.values(), radii_of, examined, files.models) if keys else []
-        if (took := time.monotonic() - began) > LONG and any(native_twin(fmu) != fmu for fmu in files.fmus):
-            inform(f"means of squares took {took:.0f} s by FMUs in Python; quadcosim build --native makes fast ones")
-        for key, radius in zip(keys, found):
-            for place in places[key]:
-                radii[place] = radius
-    if long := chosen.keys() - linear.keys():
-        where = f" at {sum(len(places[key]) for key in long)} of {len(systems)} points" if len(systems) > 1 else ""
-        inform(
-            f"means of squares not examined{where}: a hyperperiod of {max(samples[key] for key in long)} samples; "
-            "quadcosim expect does, or says why not"
-        )
-    return MeanSquares(radii=radii, left_out=sum(len(places[key]) for key in chosen.keys() - {*keys}))
+        found = isolated_call(files.fmus.values(), growths_of, systems, files.models) if systems else []
+    except QuadcosimError as error:
+        return [MeanSquares(remark=f"{NOT_EXAMINED}{error}")] * len(systems)
+    if (took := time.monotonic() - began) > LONG and any(native_twin(fmu) != fmu for fmu in files.fmus):
+        inform(f"means of squares took {took:.0f} s by FMUs in Python; quadcosim build --native makes fast ones")
+    return found
 
 
 def _samples_in_hyperperiod(system: System) -> int:
@@ -165,17 +173,32 @@ def objectives_of_means(system: System) -> list[str]:
     return found
 
 
-def radii_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[float | None]:
-    """The mean-square radii of systems; None for one that is not linear about a rest, or too large.
+def objectives_of_squares(system: System) -> list[str]:
+    """Those of them whose variance over runs is of fourth moments."""
+    nodes = inlined_objectives(system.objectives)
+    return [name for name in objectives_of_means(system) if has_mean_of_squares(nodes[name])]
+
+
+def growths_of(systems: Sequence[System], models: Mapping[str, Model]) -> list[MeanSquares]:
+    """What the growth of second and fourth moments says of systems; not examined is what is not linear about a rest.
 
     Those of long periods come first: what is measured over a long one holds over shorter ones.
     """
-    loops, found = Loops(models, nearly=True), dict[int, float | None]()
+    loops, found = Loops(models, nearly=True), dict[int, MeanSquares]()
     with progress_bar("means of squares") as report:
         for place in sorted(range(len(systems)), key=lambda place: -max(periods_of(systems[place]), default=0)):
             report(len(found) / len(systems))
             try:
-                found[place] = loops.radius(systems[place], agree=SURE_TOLERANCE)
-            except QuadcosimError:
-                found[place] = None
+                found[place] = _of_loop(loops.jump_linear(systems[place], agree=SURE_TOLERANCE))
+            except QuadcosimError as error:
+                found[place] = MeanSquares(remark=f"{NOT_EXAMINED}{error}")
     return [found[place] for place in range(len(systems))]
+
+
+def _of_loop(loop: JumpLinear) -> MeanSquares:
+    if loop.radius >= 1.0:
+        return MeanSquares(remark=NO_EXPECTATION, radius=loop.radius)
+    fourth = loop.fourth_moment_radius if loop.fourth_moment_work <= MAX_FOURTH_WORK else None
+    if fourth is None:
+        return MeanSquares(remark=VARIANCE)
+    return MeanSquares(remark=NO_VARIANCE, radius=fourth) if fourth >= 1.0 else MeanSquares()

@@ -208,14 +208,33 @@ class JumpLinear:
             now = later
         return now, costs
 
+    @property
+    def _halves(self) -> list[list[int]]:
+        """The numbers in the symmetric squares of the states, by stage and mode."""
+        return [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
+
+    @property
+    def _fourth_products(self) -> int:
+        """The number of products that propagate fourth moments over a period."""
+        halves = self._halves
+        return sum(halves[i][p.begin] ** 3 for i, stage in enumerate(self._stages) for p in stage)
+
+    @property
+    def fourth_moment_work(self) -> int:
+        """The number of products that find the growth factor of fourth moments."""
+        if self._deterministic_map is not None:
+            return 0
+        return self._fourth_products * int(_SymmetricBasis(self._halves[0]).count)
+
     @functools.cached_property
     def fourth_moment_radius(self) -> float | None:
         """The growth factor of fourth moments over a period; None where they are more than `DENSE`."""
         if self._deterministic_map is not None:
             return _spectral_radius(self._deterministic_map) ** 4
-        halves = [[n * (n + 1) // 2 for n in sizes] for sizes in self._sizes]
-        work = sum(halves[i][p.begin] ** 3 for i, stage in enumerate(self._stages) for p in stage)
-        if work > MAX_FOURTH_PRODUCTS:
+        halves, basis = self._halves, _SymmetricBasis(self._halves[0])
+        if self._fourth_products > MAX_FOURTH_PRODUCTS:
+            return None
+        if basis.count > DENSE:  # by Krylov's method their rounding may grow faster than they do
             return None
         stages = [
             _BatchedStage(
@@ -224,9 +243,6 @@ class JumpLinear:
             )
             for i, stage in enumerate(self._stages)
         ]
-        basis = _SymmetricBasis(halves[0])
-        if basis.count > DENSE:  # by Krylov's method their rounding may grow faster than they do
-            return None
 
         def propagate(numbers: Floats) -> Floats:
             now = basis.matrices(numbers)

@@ -54,6 +54,25 @@ def means_of(node: syntax.Node) -> list[syntax.Call]:
     return found
 
 
+def has_mean_of_squares(node: syntax.Node) -> bool:
+    """Whether some mean in an objective may be of products of signals: of these `rms` is a root, others are linear."""
+    return any(call.function == "mean" and not _is_linear(call.arguments[0]) for call in reductions(node))
+
+
+def _is_linear(node: syntax.Node) -> bool:
+    match node:
+        case syntax.Number() | syntax.Name():
+            return True
+        case syntax.Operation("+" | "-" | "neg", operands):
+            return all(map(_is_linear, operands))
+        case syntax.Operation("*", (one, other)):
+            constant = not {*syntax.names(one)} or not {*syntax.names(other)}
+            return constant and _is_linear(one) and _is_linear(other)
+        case syntax.Operation("/", (one, other)):
+            return not {*syntax.names(other)} and _is_linear(one)
+    return False
+
+
 def _not_a_mean(written: str) -> str:
     return f"{written}: expected mean(…) or rms(…), of which there are expectations"
 

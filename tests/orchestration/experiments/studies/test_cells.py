@@ -7,6 +7,7 @@ import sqlite3
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ from orchestration.experiments.studies.cell_lines import cell_lines
 from orchestration.experiments.studies.cell_maps import cell_maps
 from orchestration.experiments.studies.shares import (
     PAIR,
-    WITHOUT,
+    REMARKS,
     TwoLaws,
     averages_of,
     differences_in,
@@ -41,6 +42,7 @@ from orchestration.foundation.basics.statistics import pair_correlation, wilson
 from orchestration.quadrotor.scenarios.vehicle import load_vehicle
 from orchestration.simulation.figures.names import COLUMNS
 from orchestration.simulation.figures.style import INCH, PAGE, STYLES
+from orchestration.theory.exact.mean_square import NO_EXPECTATION
 from quadcosim import Scenario, UsageError
 from tests.commands import Main
 from tests.orchestration.experiments.studies.common import STORE, axis, study
@@ -53,10 +55,10 @@ WORDS = ("settled", "bounded")
 
 def runs() -> pd.DataFrame:
     """All runs of the first law are good; of the second as many as its cell has in its index, none at 20 ms."""
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "controller": law, "timing.period": period, "timing.loss": loss, "seed": seed, "status": "done",
-            "random": True, WITHOUT: "", PAIR: seed, "diverged": False,
+            "random": True, REMARKS: {}, PAIR: seed, "diverged": False,
             "good": first or (period < 0.02 and seed < 3 * k),
             "position_rmse": 1.0 + seed,
         }
@@ -153,7 +155,7 @@ def test_a_mean_without_a_finite_expectation_has_no_interval_no_dot_and_no_colou
     table, metric = runs(), "position_rmse"
     is_second = table["controller"] == laws.second
     at = is_second & (table["timing.loss"] == 0.2)
-    table[WITHOUT] = pd.Series([(metric,) if each else () for each in at], index=table.index, dtype=object)
+    table[REMARKS] = pd.Series([{metric: NO_EXPECTATION} if each else {} for each in at], index=table.index)
     table[metric] += 10.0 * is_second + 1e6 * at
     means = averages_of(table, names, metric, "mean").set_index(names)
     infinite = means["remark"] == "no finite expectation"

@@ -4,7 +4,7 @@ import dataclasses
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +15,7 @@ import pytest
 
 from orchestration.command.exact import warn_if_means_are_infinite
 from orchestration.experiments.studies.infinite_means import InfiniteMeans
+from orchestration.experiments.studies.study_file import load_study
 from orchestration.foundation.basics.bisection import Range
 from orchestration.quadrotor.flight.hover_loop import HoverLoop
 from orchestration.quadrotor.scenarios.fmu_choice import FmuChoice
@@ -32,7 +33,8 @@ from orchestration.theory.exact import flown, mean_square, moments
 from orchestration.theory.exact.as_simulated import expect_rows
 from orchestration.theory.exact.expect import Expected, expect, expected_of
 from orchestration.theory.exact.loops import Loops, expect_same_steps
-from orchestration.theory.exact.objectives import means_of
+from orchestration.theory.exact.mean_square import NO_EXPECTATION, NO_VARIANCE, MeanSquares
+from orchestration.theory.exact.objectives import has_mean_of_squares, means_of
 from orchestration.theory.exact.random_times import CERTAIN, RandomLink, RandomTime, SampledTask, exact_seconds
 from orchestration.theory.exact.timing import sampled_tasks
 from orchestration.theory.stability.excitation import Rest
@@ -148,12 +150,41 @@ def test_a_loop_with_too_many_fourth_moments_says_so(monkeypatch: pytest.MonkeyP
 
 def test_radii_of_many_systems_show_how_far_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     shares = list[float]()
-    monkeypatch.setattr(mean_square, "Loops", lambda _, nearly: SimpleNamespace(radius=lambda _, agree: agree))
+    loop = SimpleNamespace(radius=2.0)
+    monkeypatch.setattr(mean_square, "Loops", lambda _, nearly: SimpleNamespace(jump_linear=lambda _, agree: loop))
     monkeypatch.setattr(mean_square, "progress_bar", lambda _: nullcontext(shares.append))
-    assert (
-        mean_square.radii_of(cast("Any", [SimpleNamespace(components={})] * 2), {}) == [mean_square.SURE_TOLERANCE] * 2
-    )
+    found = mean_square.growths_of(cast("Any", [SimpleNamespace(components={})] * 2), {})
+    assert found == [MeanSquares(remark=NO_EXPECTATION, radius=2.0)] * 2
     assert shares == [0.0, 0.5]
+
+
+def test_a_system_that_expect_refuses_is_not_examined_and_the_reason_is_kept() -> None:
+    fine = example("minimum_variance", {"connections.command.loss": 0.2})
+    sampled = Source(noise=1.0, period=0.1, to=("controller.x",))
+    noisy = dataclasses.replace(fine, connections=fine.connections[1:], sources={**fine.sources, "noisy": sampled})
+    models = files_of(fine).models
+    refused, wide = mean_square.growths_of([noisy, fine], models)
+    assert refused.remark.startswith("not examined: sources.noisy: white noise into controller.x, which samples it")
+    assert wide.remark == NO_VARIANCE
+    assert wide.radius == pytest.approx(Loops(models).solve(fine).loop.result.fourth_moment_radius)
+
+
+def test_fourth_moments_of_a_large_loop_are_left_to_expect(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mean_square, "MAX_FOURTH_WORK", 1.0)
+    lossy, sure = (example("minimum_variance", {"connections.command.loss": loss}) for loss in (0.2, 0.0))
+    found = mean_square.growths_of([lossy, sure], files_of(lossy).models)
+    assert [one.remark for one in found] == ["variance not examined: too many fourth moments", ""]
+
+
+@pytest.mark.parametrize(
+    ("text", "squares"),
+    [
+        ("mean(x ** 2)", True), ("2 * mean(x * y) + rms(x)", True), ("mean(abs(x))", True),
+        ("rms(x - y)", False), ("mean(2 * (x - y) / 3)", False),
+    ],
+)  # fmt: skip
+def test_means_of_products_have_a_variance_of_fourth_moments(text: str, squares: bool) -> None:
+    assert has_mean_of_squares(parse(text)) == squares
 
 
 @pytest.mark.parametrize("rests", [{}, {"after": 3.0}])
@@ -271,7 +302,12 @@ def test_native_twins_are_linearised_if_available(
     loop_of(system)
     assert {path.parent.name for path in loaded} == {"native"}
     of_means = list[str]()
-    monkeypatch.setattr(mean_square, "isolated_call", lambda fmus, *_: [*map(of_means.append, fmus)])
+
+    def called(fmus: Iterable[str], *_: object) -> list[MeanSquares]:
+        of_means.extend(fmus)
+        return [MeanSquares()]
+
+    monkeypatch.setattr(mean_square, "isolated_call", called)
     warn_if_means_are_infinite(system)
     once = {"name": "once", "base": system, "axes": [{"name": "stop_time", "values": [1.0]}]}
     sweep(once, engine="python", out=tmp_path, progress=None, announce=None)
@@ -281,7 +317,7 @@ def test_native_twins_are_linearised_if_available(
 def test_means_of_squares_say_what_would_be_faster_if_they_take_long(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(mean_square, "isolated_call", lambda *_: [None])
+    monkeypatch.setattr(mean_square, "isolated_call", lambda *_: [MeanSquares()])
     monkeypatch.setattr(mean_square, "_with_twins", lambda *as_they_are: as_they_are)
     system = load_system(EXAMPLES / "minimum_variance/system.toml")
     for long, remarks in ((math.inf, 0), (-1.0, 1)):
@@ -295,23 +331,21 @@ def test_rates_far_apart_are_not_examined_by_a_run_and_a_line_says_so(
 ) -> None:
     examined = list[int]()
 
-    def known(systems: Sequence[System], models: object) -> list[float | None]:
+    def known(systems: Sequence[System], models: object) -> list[MeanSquares]:
         examined.append(len(systems))
-        return [2.0] * len(systems)
+        return [MeanSquares(remark=NO_EXPECTATION, radius=2.0)] * len(systems)
 
-    monkeypatch.setattr(mean_square, "radii_of", known)
+    monkeypatch.setattr(mean_square, "growths_of", known)
     system = load_system(EXAMPLES / "minimum_variance/system.toml")
     fast = dataclasses.replace(system.components["controller"], sampling=Sampling(period=0.25))
     cascade = dataclasses.replace(system, components={**system.components, "inner": fast})
     near, far = (changed(cascade, {"components.controller.sampling.period": period}) for period in (1.0, 100.0))
     files = files_of(system)
     found = mean_square.mean_squares(system, [far, near], files)
-    assert (found.radii, found.left_out, examined) == ([None, 2.0], 1, [1])
-    assert mean_square.mean_squares(system, [far], files).left_out == 1
-    assert capsys.readouterr().err.splitlines() == [
-        f"means of squares not examined{where}: a hyperperiod of 401 samples; quadcosim expect does, or says why not"
-        for where in (" at 1 of 2 points", "")
-    ]
+    why = "not examined: a hyperperiod of more than 250 samples; quadcosim expect does, or says why not"
+    assert ([one.remark for one in found], examined) == ([why, NO_EXPECTATION], [1])
+    warn_if_means_are_infinite(far)
+    assert capsys.readouterr().err == f"means of squares {why}\n"
 
 
 def test_a_run_that_is_interrupted_while_means_are_examined_has_printed_its_result(
@@ -378,9 +412,9 @@ repeat = "seed"
     printed = table_with_them.stdout
     assert unknown not in table_with_them.stderr
     assert [line.count("no finite expectation") for line in printed.splitlines()[2:5]] == [0, 0, 1]
-    found = InfiniteMeans.in_store(store / "study.sqlite")
-    assert found is not None
-    assert (found.points, found.total, found.left_out) == (((0.3, 5.0),), 3, 0)
+    assert "2 cells without an interval: no finite variance" in printed
+    found = InfiniteMeans.in_store(store / "study.sqlite", load_study(study))
+    assert found.remarks == {NO_EXPECTATION: ((0.3, 5.0),), NO_VARIANCE: ((0.1, 5.0), (0.2, 5.0))}
 
 
 def test_a_plant_is_measured_once_for_shorter_periods_to_the_accuracy_of_a_radius(
@@ -391,14 +425,15 @@ def test_a_plant_is_measured_once_for_shorter_periods_to_the_accuracy_of_a_radiu
         for period, loss in ((0.5, 0.1), (1.0, 0.1), (1.0, 0.3))
     ]
     models, measured = files_of(systems[0]).models, list[float]()
-    exact = [Loops(models).radius(system, agree=mean_square.SURE_TOLERANCE) for system in systems]
+    exact = [mean_square.growths_of([system], models)[0].radius for system in systems]
 
     def counted(rest: Rest, period: float, step: float, *, unit: float | None) -> Tangent:
         measured.append(period)
         return in_continuous_time(rest, period, step, unit=unit)
 
     monkeypatch.setattr("orchestration.theory.stability.loop_at_rest.in_continuous_time", counted)
-    assert mean_square.radii_of(systems, models) == pytest.approx(exact, rel=1e-6)
+    radii = [one.radius for one in mean_square.growths_of(systems, models)]
+    assert radii == pytest.approx(exact, rel=1e-6)
     assert measured == [1.0]
 
 
@@ -417,7 +452,8 @@ def test_what_fails_with_a_component_as_in_other_systems_is_measured_anew(monkey
 
 def test_what_is_too_much_to_linearise_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mean_square, "MAX_LINEARISED", 1)
-    monkeypatch.setattr(mean_square, "radii_of", lambda systems, models: [2.0] * len(systems))
+    infinite = MeanSquares(remark=NO_EXPECTATION, radius=2.0)
+    monkeypatch.setattr(mean_square, "growths_of", lambda systems, models: [infinite] * len(systems))
     changes = [
         {"connections.command.loss": loss, "components.controller.parameters.gain": gain}
         for gain in (1.0, 1.2)
@@ -425,7 +461,8 @@ def test_what_is_too_much_to_linearise_is_left_out_and_counted(monkeypatch: pyte
     ]
     systems = [example("minimum_variance", each) for each in changes]
     found = mean_square.mean_squares(systems[0], systems, files_of(systems[0]))
-    assert (found.radii, found.infinite, found.left_out) == ([2.0, 2.0, None, None], [0, 1], 2)
+    left_out = MeanSquares(remark=f"not examined: {mean_square.TOO_MANY}")
+    assert found == [infinite, infinite, left_out, left_out]
 
 
 @needs_compiler
