@@ -13,6 +13,7 @@ from orchestration.experiments.studies.checks import Checked, check_design
 from orchestration.experiments.studies.infinite_means import INFINITE, InfiniteMeans
 from orchestration.experiments.studies.lane_agreement import with_python_twins
 from orchestration.experiments.studies.missing_runs import ENGINE, Announce, Flight, run_missing
+from orchestration.experiments.studies.overloaded_points import overloads_in_words
 from orchestration.experiments.studies.run_columns import RunColumns
 from orchestration.experiments.studies.run_key import CONTENT, design_parts, difference, place_parts, study_parts
 from orchestration.experiments.studies.store_columns import GUIDS, UNITS
@@ -22,7 +23,7 @@ from orchestration.experiments.studies.swept import Swept
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.interrupt import Interrupted
-from orchestration.foundation.basics.terminal import CountProgress, inform, runs_reporter
+from orchestration.foundation.basics.terminal import CountProgress, inform, runs_reporter, warn
 from orchestration.simulation.engines.resolved import check_against_fmus
 from orchestration.simulation.requests.ranges import paths_in, unit_at
 from orchestration.simulation.results.own_metrics import metrics_from_sources
@@ -93,6 +94,9 @@ def sweep(
                 columns=columns, execution=execution, files=files, local=workers, cluster=reached,
                 time_limit=time_limit, chosen=engine == "auto",
             )  # fmt: skip
+            if announce is not None:
+                for text in overloads_in_words(study, columns.files.start_values, json.loads(opened.about()[UNITS])):
+                    warn(text)
             flown, agreement = run_missing(opened, flight, report, announce, retry_failed=retry_failed)
         infinite = _infinite_means(opened, columns)
         if announce is not None:

@@ -36,11 +36,17 @@ def demand_of(task: Task, computer: Computer, seen: float) -> float:
 
 def overloads_in_words(systems: Sequence[System]) -> list[str]:
     """A warning for each processor with an overload in one of these systems, with its largest demand."""
-    worst = dict[str, Overload]()
+    by_name = dict[str, list[Overload]]()
     for system in systems:
-        for found in overloads(system):
-            worst[found.name] = max(found, worst.get(found.name, found), key=lambda one: one.demand)
-    return [f"{one.text(up_to=len(systems) > 1)}; what is computed is of the jobs that start" for one in worst.values()]
+        for one in overloads(system):
+            by_name.setdefault(one.name, []).append(one)
+    return [worst_in_words(found, several=len(systems) > 1) for found in by_name.values()]
+
+
+def worst_in_words(found: Sequence["Overload"], *, several: bool) -> str:
+    """A warning about overloads of one processor, with the largest demand of `several` systems."""
+    worst = max(found, key=lambda one: one.demand)
+    return f"{worst.text(up_to=several)}; what is computed is of the jobs that start"
 
 
 @contextmanager
