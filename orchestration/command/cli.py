@@ -20,6 +20,7 @@ from orchestration.foundation.basics.errors import (
     UsageError,
     did_you_mean,
     no_utf8,
+    without_unit,
     worded_by,
 )
 from orchestration.foundation.basics.extras import lack_of
@@ -170,6 +171,11 @@ def _usage_message(error: Exception) -> str | None:
     describe = getattr(error, "format_message", None)
     if describe is None:
         return None
+    for problem in getattr(error.__cause__, "errors", list)():  # of Pydantic, which converts what is given
+        if problem["type"] in ("float_parsing", "int_parsing"):
+            kind = "a number" if problem["type"] == "float_parsing" else "a whole number"
+            given = f"{error.param.opts[0]} {problem['input']}"  # type: ignore[attr-defined]
+            return f"{given}: expected {kind}{without_unit(problem['input'])}"
     flag, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
     if not (flag and known):
         return str(describe())

@@ -128,7 +128,9 @@ class Comparison:
         for kind in ("controllers", "vehicles", "conditions"):
             names = [one.name for one in getattr(self, kind)]
             if not names or len(set(names)) != len(names):
-                raise UsageError(f"{kind} = {', '.join(names)}: expected at least one, each with its own name")
+                raise UsageError(
+                    f"{kind} = {', '.join(names) or 'none'}: expected at least one, each with its own name"
+                )
         if self.axis.values is None or any(isinstance(v, str) for v in self.axis.values):
             raise UsageError(f"axis {self.axis.name}: expected values, or start, stop and number")
         if sorted(self.axis.values) != [*self.axis.values]:

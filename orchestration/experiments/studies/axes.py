@@ -64,7 +64,9 @@ class Axis:
         if of_scenario & {*self.targets} and any(is_table(v) or not isinstance(v, str) for v in self.values or ()):
             raise UsageError(f"axis {self.name}: expected controllers by name or path; {OF_ONE_LAW}")
         if len({_kind(value) for value in self.values or ()}) > 1:
-            raise UsageError(f"axis {self.name}: expected values of one kind: numbers, texts, or true and false")
+            given = ", ".join(repr(value) for value in {_kind(value): value for value in self.values or ()}.values())
+            kinds = "expected values of one kind: numbers, texts, or true and false"
+            raise UsageError(f"axis {self.name}: {kinds}; there are {given}")
         if self.values is None:
             _check_range(self.name, self.low, self.high, self.scale)
 

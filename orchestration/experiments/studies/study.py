@@ -67,7 +67,7 @@ class Study:
     def __post_init__(self) -> None:
         names = [axis.name for axis in self.axes]
         if len(set(names)) != len(names) or not names:
-            raise UsageError(f"axes = {', '.join(names)}: expected at least one axis, each with its own name")
+            raise UsageError(f"axes = {', '.join(names) or 'none'}: expected at least one axis, each with its own name")
         if not _NAME.fullmatch(self.name):
             raise UsageError(
                 f"name = {self.name!r}: expected the name of a folder: at most 100 letters, digits, spaces and - _ . +"

@@ -137,6 +137,15 @@ def shown(value: object) -> str:
     return text if len(text) <= 100 else f"{text[:99]}…"
 
 
+_WITH_UNIT = re.compile(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[^\W\d].*")
+
+
+def without_unit(value: object) -> str:
+    """The end of a message on what is no number: that it has a unit, if so."""
+    has_one = isinstance(value, str) and _WITH_UNIT.fullmatch(value)
+    return " without its unit; times are in seconds" if has_one else ""
+
+
 def told_apart(value: float, bound: float, digits: int = 6) -> tuple[str, str]:
     """A value and its bound as texts, with as many digits as it takes for the texts to compare as the numbers do."""
     for count in range(digits, 18):

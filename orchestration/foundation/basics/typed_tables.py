@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from orchestration.foundation.basics.attribute_docs import attribute_docs
-from orchestration.foundation.basics.errors import UsageError, no_such_key, shown
+from orchestration.foundation.basics.errors import UsageError, no_such_key, shown, without_unit
 from orchestration.foundation.basics.fitting import MisfitError, fitted, hints_of
 from orchestration.foundation.basics.records import default_of, is_record
 
@@ -195,7 +195,7 @@ def _shape_at(shape: Any, place: Sequence[Any]) -> Any:
     for part in parts:
         shape, one_of_many = _table_in(fields_of(shape)[part].annotation)
         if one_of_many:
-            next(parts)
+            next(parts, None)  # none of a missing one
     return shape
 
 
@@ -277,7 +277,8 @@ def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapp
             return f"{place}: no such key; {elsewhere[key]}"
         return no_such_key(place.removesuffix(key), key, keys_at(file, parts[:-1]))
     if problem["type"] in _MISSING:
-        return f"{place}: expected a value"
+        keys = ", ".join(keys_at(file, parts))
+        return f"{place}: expected {f'a table with {keys}' if keys else 'a value'}"
     value = problem["input"]
     message = problem["msg"]
     if message.startswith(_KIND):  # it may be one of several
@@ -285,4 +286,5 @@ def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapp
         kinds = list(dict.fromkeys(text.removeprefix(_KIND) for text in here if text.startswith(_KIND)))
         message = _KIND + " or ".join([", ".join(kinds[:-1]), kinds[-1]] if kinds[1:] else kinds)
     message = message.replace("Input should be", "expected")
-    return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message[:1].lower()}{message[1:]}"
+    message = f"{message[:1].lower()}{message[1:]}" + (without_unit(value) if message.endswith("number") else "")
+    return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message}"

@@ -169,8 +169,8 @@ def expect_traceable(fmu: Path) -> None:
     model = read_model(fmu)
     if model.version != 2:
         raise UsageError(
-            f"{fmu}: FMI {model.description.fmiVersion}; expected FMI 2.0 to trace it in other masters; the CSV of "
-            "quadcosim run MODEL.fmu --output FILE is that of fmpy simulate, of either"
+            f"{fmu}: FMI {model.description.fmiVersion}; expected FMI 2.0 to trace it in other masters; export it as "
+            "FMI 2.0, or compare the CSVs of quadcosim run MODEL.fmu --output FILE and fmpy simulate, which take both"
         )
     if compiler() is None:
         raise UsageError(f"{fmu}: expected a C compiler called cc, on Linux (x86_64), to trace it in other masters")

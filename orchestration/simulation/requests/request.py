@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from orchestration.foundation.basics.documents import copied_tables, read_toml
 from orchestration.foundation.basics.errors import UsageError, shown
+from orchestration.foundation.basics.terminal import warn
 from orchestration.simulation.requests.kinds import KINDS, RequestKind
 from orchestration.systems.system.file import is_system, system_from_tables
 from orchestration.systems.system.model import System
@@ -71,6 +72,8 @@ def load_request(path: str | Path, timing: str | Path | None = None) -> Request:
 
         return alone(path)
     tables = read_toml(path, WHAT)
+    if not tables:
+        warn(f"{path}: is empty: it is the paper's flight, as without a file")
     with _errors_naming(path):
         if isinstance(tables.get(SSP), str):
             return _from_ssp(path.parent / tables.pop(SSP), tables, path.parent)

@@ -3,7 +3,7 @@
 import math
 from typing import Any, TypeGuard
 
-from orchestration.foundation.basics.errors import UsageError, shown, told_apart
+from orchestration.foundation.basics.errors import UsageError, shown, told_apart, without_unit
 from orchestration.foundation.basics.times import exact_nanoseconds
 
 
@@ -22,7 +22,8 @@ def is_finite(value: object) -> TypeGuard[float]:
 def require(condition: bool, name: str, value: object, expected: str) -> None:
     """Require the condition; the error reports `name`, `value` and what is `expected`."""
     if not condition:
-        raise UsageError(f"{name} = {shown(value)}: expected {expected}")
+        unit = without_unit(value) if expected.endswith("number") else ""
+        raise UsageError(f"{name} = {shown(value)}: expected {expected}{unit}")
 
 
 def _quoted(value: object) -> object:

@@ -310,6 +310,7 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--period", "-1"], "timing.period = -1.0: expected a positive number"),
         (["--jitter", "0.02"], "timing.jitter = 0.02: expected less than the period"),
         (["--delay", "late"], "--delay late: expected a number, or a table"),
+        (["--period", "10ms"], "--period 10ms: expected a number without its unit; times are in seconds"),
         (["--delay", "{unifrm=[0,1]}"], "timing.delay.unifrm: no such key; expected one of uniform"),
         (["--loss", "2"], "timing.loss = 2.0: expected a probability"),
         (["--stop-time", "0"], "stop_time = 0.0: expected a positive number"),

@@ -272,10 +272,13 @@ def test_of_an_unknown_target_the_closest_is_named(target: str) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "axes = : expected at least one axis"),
+        ("", "axes = none: expected at least one axis"),
         ('[[axes]]\nname = "steps"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis steps: the table of runs has"),
         ('[[axes]]\nname = "seed"\nsets = ["timing.period"]\nvalues = [0.1]\n', "axis seed: the table of runs has"),
-        ('[[axes]]\nname = "x"\nsets = ["seed"]\nvalues = [1, true]\n', "axis x: expected values of one kind"),
+        (
+            '[[axes]]\nname = "x"\nsets = ["seed"]\nvalues = [1, true]\n',
+            "axis x: expected values of one kind: numbers, texts, or true and false; there are 1, True",
+        ),
         ('name = "../evil"\n' + ONE, "name = '../evil': expected the name of a folder"),
         (ONE + ONE, "axes = seed, seed: expected at least one axis, each with its own name"),
         (ONE + "sets = ['seed']\nmultiplies = ['seed']\n", "axis seed: expected sets or multiplies, not both"),

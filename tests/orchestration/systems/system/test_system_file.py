@@ -51,6 +51,11 @@ def refusal(folder: Path, text: str) -> str:
         ("good =", "god =", "criterion.god: no such key; expected one of good, diverged, outcomes"),
         ("seed = 3", "sead = 3", "sead: no such key; expected one of stop_time, seed, components, "),
         ("step = 0.01", 'step = "fast"', "components.tank.step = 'fast': expected a valid number"),
+        (
+            "step = 0.01",
+            'step = "10 ms"',
+            "components.tank.step = '10 ms': expected a valid number without its unit; times are in seconds",
+        ),
         ("step = 0.01", "step = -1.0", "components.tank.step = -1.0: expected a positive number"),
         (
             "step = 0.01",
