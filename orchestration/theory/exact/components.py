@@ -10,9 +10,10 @@ import json
 from dataclasses import asdict, dataclass, replace
 
 from orchestration.foundation.basics.times import NANOSECONDS
+from orchestration.theory.stability.excitation import STANDS_OUT
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.lifted_component import LiftedTangent
-from orchestration.theory.stability.linearised_component import Tangent
+from orchestration.theory.stability.linearised_component import UNPROVEN, Tangent
 from orchestration.theory.stability.loop_at_rest import AtRest
 from orchestration.theory.stability.matrices import (
     INEXACT,
@@ -92,7 +93,8 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     if component.sampling is not None:
         part = _sampled(found, step)
     else:
-        matrices = in_continuous_time(tangent, step, differs if accuracy <= SAME else INEXACT, component.step)
+        most = max(INEXACT, min(STANDS_OUT * tangent.rounding, UNPROVEN))
+        matrices = in_continuous_time(tangent, step, differs if accuracy <= SAME else INEXACT, component.step, most)
         part = replace(matrices, step=tangent.derivatives)
         if accuracy > SAME or matrices.misfit > differs:
             accuracy, precision = max(accuracy, matrices.misfit), matrices.misfit

@@ -169,18 +169,23 @@ def _above_rounding(found: Tangent, step: float) -> Tangent:
 
     The pulse that is linear for longest may be so small that rounding spoils states which hardly move the outputs.
     """
-    error = max(found.accuracy, misfit(found, step))
+    error = _error(found, step)
     while error > EXACT and LARGER * found.pulse <= MAX_PULSE:
         try:
             larger = found.with_pulse(LARGER)
             _prove(larger, step)
         except UsageError:
             break
-        after = max(larger.accuracy, misfit(larger, step))
+        after = _error(larger, step)
         if len(larger.state) < len(found.state) or after >= error:
             break
         found, error = larger, after
     return found
+
+
+def _error(tangent: Tangent, step: float) -> float:
+    """Its largest known error: a misfit that is small by chance leaves the one expected of its measurement."""
+    return max(tangent.accuracy, tangent.rounding, misfit(tangent, step))
 
 
 def _prove(tangent: Tangent, step: float) -> None:

@@ -81,7 +81,7 @@ class Tangent(LinearSimulator):
         self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
         self._fewest, self._most, self._points = fewest, most, min(points, len(self.ladder))
         self._known: dict[int, tuple[Floats, Floats]] = {}
-        self.accuracy = 0.0
+        self.accuracy = self._measured = 0.0
         self._find_coordinates(excitation.errors_over(ladder), fewest)
         self.state = np.zeros(len(self._inverse))
 
@@ -92,8 +92,11 @@ class Tangent(LinearSimulator):
 
     @property
     def rounding(self) -> float:
-        """The error, relative, that rounding alone may leave in derivatives by nearly dependent coordinates."""
-        return ROUNDED * float(np.linalg.cond(self._inverse)) if len(self._inverse) else 0.0
+        """The error, relative, that rounding alone may leave in derivatives.
+
+        By nearly dependent coordinates, or of small responses beside the values at rest: as two sizes of pulses differ.
+        """
+        return max(self._measured, ROUNDED * float(np.linalg.cond(self._inverse))) if len(self._inverse) else 0.0
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""
@@ -299,6 +302,9 @@ class Tangent(LinearSimulator):
             )
         self._produced = [produced[k] for k in chosen]
         self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))
+        seen = np.column_stack([noise[k] for k in chosen])
+        spread = (self._axes.T**2 @ np.where(np.isfinite(seen), seen, 0.0) ** 2) @ self._inverse**2
+        self._measured = float(np.sqrt(spread).max())
 
     def _growth(self, i: int) -> float:
         """The factor by which the response to a pulse on an input grows in a step, at most."""

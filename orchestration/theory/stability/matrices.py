@@ -155,12 +155,13 @@ def turns_of(tangent: Tangent | LiftedTangent, period: float) -> list[Matrices]:
 
 
 def in_continuous_time(
-    tangent: Tangent, first: float, differs: float = INEXACT, own: float | None = None
+    tangent: Tangent, first: float, differs: float = INEXACT, own: float | None = None, most: float = INEXACT
 ) -> Continuous:
     """The matrices of a component in continuous time.
 
     `first` is a step [s] that it takes. Where two steps differ from one of twice the length by more than `differs`,
-    relative, shorter ones are tried down to its `own`, with which it is simulated; default: `first`.
+    relative, shorter ones are tried down to its `own`, with which it is simulated; default: `first`. The matrices are
+    unfit where these differ by more than `most`, too.
     """
     count = len(tangent.outputs)
     h = first if tangent.unit is not None else _informative_step(tangent, first)
@@ -174,7 +175,7 @@ def in_continuous_time(
         unfit = f"a step of {h:g} s is too long to show what happens within it"
         A, B, C, D = np.zeros_like(change), np.zeros_like(moved), by_state[:count], by_input[:count]
     else:
-        if differs_by > INEXACT:
+        if differs_by > most:
             unfit = f"a step of {2 * h:g} s differs from two of {h:g} s by {differs_by:.1g}"
         A = _logarithm(change) / h
         B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h

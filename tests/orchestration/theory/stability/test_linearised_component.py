@@ -10,7 +10,7 @@ import pytest
 
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.theory.stability import matrices
-from orchestration.theory.stability.excitation import Excitation, ImpreciseError, Rest, Rung
+from orchestration.theory.stability.excitation import STANDS_OUT, Excitation, ImpreciseError, Rest, Rung
 from orchestration.theory.stability.identification import in_continuous_time, of_samples
 from orchestration.theory.stability.lifted_component import of_one_rate
 from orchestration.theory.stability.linearised_component import Tangent
@@ -133,10 +133,12 @@ def test_pulses_are_enlarged_where_rounding_spoils_states_that_hardly_move_the_o
     ball: Any = Levitated()
     held = np.array([ball.VOLTAGE])
     about = Rest(fmu=ball, inputs=("u",), held=held, outputs=("y",), time=0.0)
-    found = matrices.in_continuous_time(in_continuous_time(about, 0.001, 0.0005), 0.00025)
+    tangent = in_continuous_time(about, 0.001, 0.0005)
+    found = matrices.in_continuous_time(tangent, 0.00025)
     falls = (2.0 * 9.81 / 0.01) ** 0.5
     assert found.unfit is None
     assert 1e-9 < found.misfit < matrices.INEXACT
+    assert found.misfit < STANDS_OUT * tangent.rounding < 10.0 * matrices.INEXACT
     assert np.sort(np.linalg.eigvals(found.A).real) == pytest.approx([-250.0, -falls, falls], rel=1e-5)
 
 
