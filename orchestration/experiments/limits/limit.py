@@ -243,7 +243,7 @@ def _mean_square_note(found: LinearLimit, span: Range) -> list[str]:
     """The note on the mean-square limit."""
     if found.limit is None:
         return [found.reason] if found.reason else []
-    further = f", {found.reason}" if found.reason else ""
+    further = f"; {found.reason}" if found.reason else ""
     return [f"just above {span.text(found.limit)} means of squares have no finite expectation{further}"]
 
 

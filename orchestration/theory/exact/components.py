@@ -24,6 +24,7 @@ from orchestration.theory.stability.matrices import (
     turns_of,
     whole_nanoseconds,
 )
+from orchestration.theory.stability.operating_point import periods_of
 
 SAME = 1e-9
 """Error of the predicted response, relative to the largest, up to which a component is linear, and difference of a step
@@ -120,4 +121,4 @@ def _informative_step(loop: AtRest, name: str) -> float:
         return component.sampling.period
     if not loop.simulation.instances[name].model.varies_step:
         return component.step or 0.0
-    return whole_nanoseconds(float(loop.period) / NANOSECONDS / 4.0)
+    return whole_nanoseconds(float(min(periods_of(loop.simulation.system))) / NANOSECONDS / 4.0)

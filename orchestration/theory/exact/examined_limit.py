@@ -1,8 +1,9 @@
-"""Local limits of systems with computers or networks, by exact radii at values at which their schedule repeats."""
+"""Limits of systems with computers or networks, by exact radii at values at which their schedule repeats."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Bracket, Range
@@ -24,6 +25,19 @@ DIGITS = 6
 """Digits of a value at most: those of few digits have the shortest hyperperiods"""
 
 
+class Moving(NamedTuple):
+    """Moving quantities of a loop, whose radius it is, in words."""
+
+    what: str
+    below: str
+    """What they do where the radius is below 1"""
+    above: str
+    """and else"""
+
+
+DEVIATIONS = Moving("small deviations", "decay", "grow")
+
+
 def local_limits(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
     """As in `stability`; where the loop has no fixed periods, by exact radii instead of twin runs."""
 
@@ -41,11 +55,14 @@ def local_limits(varied: Varied, span: Range, models: Mapping[str, Model]) -> Li
     return local_limit.local_limits(varied, span, examined)
 
 
-def by_examined(radius: Callable[[float], float], span: Range) -> LinearLimit | None:
+def by_examined(
+    radius: Callable[[float], float], span: Range, moving: Moving = DEVIATIONS, *, lower_too: bool = True
+) -> LinearLimit | None:
     """The limit, between the values that can be examined; None: none of the scan can.
 
-    A value for which `radius` raises `UsageError`, as of a schedule that does not repeat soon, is neither stable nor
-    unstable: another is sought, or the bracket remains as it is.
+    It is the upper end of the values from the system's own on, and the lower one, too, if asked for. A value for which
+    `radius` raises `UsageError`, as of a schedule that does not repeat soon, is neither below 1 nor above: another is
+    sought, or the bracket remains as it is.
     """
     tried, refused = dict[float, float](), dict[float, str]()
 
@@ -95,14 +112,19 @@ def by_examined(radius: Callable[[float], float], span: Range) -> LinearLimit | 
     values = span.values()
     own = span.own if span.own is not None and is_known(span.own) and not grows(span.own) else None
     upper = narrowed(first_in([value for value in values if own is None or value >= own]))
-    lower = None if own is None else narrowed(first_in([value for value in reversed(values) if value <= own]))
+    lower = (
+        None
+        if own is None or not lower_too
+        else narrowed(first_in([value for value in reversed(values) if value <= own]))
+    )
     if not tried:
         return None
     ends = [end for end in (lower, upper) if end is not None]
-    said = [_end_in_words(end, refused, span) for end in ends]
+    said = [_end_in_words(end, refused, span, moving) for end in ends]
     if upper is None:
         decays = [value for value in sorted(tried) if not grows(value)]
-        said.append(f"small deviations decay at each value examined, {span.text(decays[0])} to {span.text(decays[-1])}")
+        ends_examined = f"{span.text(decays[0])} to {span.text(decays[-1])}"
+        said.append(f"{moving.what} {moving.below} at each value examined, {ends_examined}")
     if refused:
         value, why = next(iter(refused.items()))
         said.append(f"not examined: {some(map(span.text, sorted(refused)))}, as {span.text(value)} for: {why}")
@@ -136,11 +158,11 @@ def _middle(bracket: Bracket | None) -> float | None:
     return None if bracket is None or bracket.good is None else 0.5 * (bracket.good + bracket.bad)
 
 
-def _end_in_words(bracket: Bracket, refused: Mapping[float, str], span: Range) -> str:
+def _end_in_words(bracket: Bracket, refused: Mapping[float, str], span: Range, moving: Moving) -> str:
     good, bad = bracket
     if good is None:
-        return f"small deviations grow at {span.text(bad)}, the lowest value that could be examined"
-    ends = f"small deviations decay at {span.text(good)} and grow at {span.text(bad)}"
+        return f"{moving.what} {moving.above} at {span.text(bad)}, the lowest value that could be examined"
+    ends = f"{moving.what} {moving.below} at {span.text(good)} and {moving.above} at {span.text(bad)}"
     between = any(min(good, bad) < value < max(good, bad) for value in refused)
     if between and abs(bad - good) > WIDTH * span.tolerance_at(bad):
         ends += ", between which no value was found that can be examined"

@@ -1,7 +1,7 @@
 """Infinite mean squares: the value of a random quantity from which on they are, and a warning for such runs."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from orchestration.systems.system.files import Files
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import at_operating_point, changed
 from orchestration.systems.system.request import Request
+from orchestration.theory.exact.examined_limit import RADIUS_TOLERANCE, Moving, by_examined
 from orchestration.theory.exact.loops import Loops, linearised_as
 from orchestration.theory.exact.moments import JumpLinear
 from orchestration.theory.exact.objectives import has_mean_of_squares, inlined_objectives, means_of
@@ -27,12 +28,16 @@ from orchestration.theory.stability.sign_changes import zero_between
 
 LIMIT_TOLERANCE = 0.01
 """Share of the tolerance of a measured limit"""
-RADIUS_TOLERANCE, ROOT = 1e-6, 1e-9
-"""Difference of a radius allowed from order to order, and from 1 at a limit"""
+ROOT = 1e-9
+"""Difference of a radius from 1 at a limit"""
+SECOND_MOMENTS = Moving("second moments", "are bounded", "grow without bound")
 
 
 def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
-    """The first value of a quantity, up from the system's own, at which the mean-square radius of the loop is 1."""
+    """The first value of a quantity, up from the system's own, at which the mean-square radius of the loop is 1.
+
+    With computers or networks it is between values that can be examined, if not all can.
+    """
     try:
         system = rested(varied.request)
         by_fmu = {component.fmu: models[name] for name, component in system.components.items()}
@@ -44,11 +49,26 @@ def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) 
 def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -> LinearLimit:
     tried = dict[float, float]()
 
-    def above(value: float) -> float:
+    def radius(value: float) -> float:
         if value not in tried:
-            with prefixed(f"at {span.text(value)}: "):
-                tried[value] = loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE) - 1.0
+            tried[value] = loops.radius(changed(system, dict.fromkeys(paths, value)), agree=RADIUS_TOLERANCE)
         return tried[value]
+
+    try:
+        return _root(radius, span, tried)
+    except (UsageError, SimulatorError):
+        known = by_examined(radius, span, SECOND_MOMENTS, lower_too=False) if system.uses_scheduler else None
+        if known is None:
+            raise
+        return known
+
+
+def _root(radius: Callable[[float], float], span: Range, tried: Mapping[float, float]) -> LinearLimit:
+    """As `mean_square_limit`; raises `UsageError` where one of the values to be `tried` cannot be examined."""
+
+    def above(value: float) -> float:
+        with prefixed(f"at {span.text(value)}: "):
+            return radius(value) - 1.0
 
     values = span.values()
     width = LIMIT_TOLERANCE * span.tolerance
@@ -61,7 +81,8 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
     low, high = zero_between(above, lambda value: value, good, bad, ROOT)
     return LinearLimit(
         limit=0.5 * (low + high),
-        reason=f"nor at what was tried above, up to {span.text(max(tried))}; other values above may have one again",
+        reason=f"nor have they at what was tried above, up to {span.text(max(tried))}; other values above may have one "
+        "again",
     )
 
 

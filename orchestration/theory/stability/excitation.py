@@ -347,7 +347,7 @@ class Excitation:
         """
         self.pulse, courses = pulse, []
         for i in range(len(self.inputs)):
-            once, other = self._two_sizes(i, rungs, self.response)
+            once, other = self.two_sizes(i, rungs, self.response)
             largest = np.abs(once).max(axis=1, initial=0.0)
             apart = np.maximum(np.abs(once - other), self._rounded if rounded else 0.0).max(axis=1, initial=0.0)
             courses.append((np.maximum.accumulate(apart), np.maximum.accumulate(largest)))
@@ -357,7 +357,7 @@ class Excitation:
             found = np.maximum(found, apart[:count] / np.where(largest[:count] > 0.0, largest[:count], np.inf))
         return found
 
-    def _two_sizes(self, i: int, rungs: Sequence[Rung], response: Callable[..., Floats]) -> tuple[Floats, Floats]:
+    def two_sizes(self, i: int, rungs: Sequence[Rung], response: Callable[..., Floats]) -> tuple[Floats, Floats]:
         """Responses to two sizes of pulses, the second one begun `later`."""
         once, other = response(i, rungs), response(i, rungs, factor=OTHER_SIZE, start=self.later)
         count = min(len(once), len(other))
@@ -368,7 +368,7 @@ class Excitation:
         twice = [*ladder, *ladder]
         values = np.zeros((len(self.inputs), len(twice), len(self.outputs)))
         for i in range(len(self.inputs)):
-            once, other = self._two_sizes(i, twice, self.followed_response)
+            once, other = self.two_sizes(i, twice, self.followed_response)
             values[i] = np.inf  # where one is too large to be followed
             values[i, : len(once)] = np.abs(once - other)
         return Errors(times=np.cumsum([rung.duration for rung in twice]), values=np.maximum(values, self._rounded))

@@ -10,11 +10,12 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability.excitation import COARSE, FINER, MAX_PULSE, Excitation, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
-from orchestration.theory.stability.linearised_component import Tangent
+from orchestration.theory.stability.linearised_component import EXACT, Tangent
 from orchestration.theory.stability.matrices import misfit
 
-HORIZONS = (16.0, 128.0, 1024.0)
-"""Lengths of ladders, in periods, tried in turn while they show more states: a fast loop leaves slow states no time"""
+HORIZON, LONGER_BY, LAST_HORIZON = 16.0, 8.0, 1024.0
+"""Length of the first ladder, in periods, factor from one to the next, and length of the last: longer ones are tried
+while they show more states, as a fast loop leaves slow states no time, or do not foretell the longest period"""
 FINEST = 0.25
 """First rung of a ladder in continuous time, in periods, at most"""
 MIN_RUNGS, MAX_RUNGS = 8, 20
@@ -29,8 +30,6 @@ SAMPLES = 32
 """Samples of the ladder of a sampled component"""
 LONGER = 4
 """Factor on it where it does not show a slow state precisely"""
-EXACT = 1e-9
-"""Error of a tangent in continuous time, relative, up to which its pulse is kept"""
 LARGER = 1.0 / FINER
 """Factor on it where the error is larger"""
 FEW = 4
@@ -139,27 +138,34 @@ def _tangent(excitation: Excitation, sample: Rung, count: int, samples: int = 1)
     return best
 
 
-def in_continuous_time(rest: Rest, period: float, step: float, *, unit: float | None = None) -> Tangent:
-    """The tangent of a component in a loop of a `period`, whose own step is `step` [s]; else as `of_samples`.
+def in_continuous_time(
+    rest: Rest, period: float, step: float, *, until: float = 0.0, unit: float | None = None
+) -> Tangent:
+    """The tangent of a component in a loop whose shortest period is `period`, its own step `step` [s].
 
-    Where the component only takes steps of one length, that is its `unit`.
+    It foretells responses `until` the longest period. Where it only takes steps of one length, that is its `unit`.
+    Else as `of_samples`.
     """
     excitation = Excitation(rest)
     longest = step if unit is not None else excitation.longest_step(step, LONGEST_STEP * period)
-    for rung in _rungs(np.array([HORIZONS[0] * period]), longest, unit):
+    for rung in _rungs(np.array([HORIZON * period]), longest, unit):
         _, excitation.later = excitation.followed(excitation.later, rung)
     first, found, linear_until = min(FINEST * period, step), None, -1.0
-    for end in (periods * period for periods in HORIZONS):
-        if linear_until < 0.0 or end > HORIZONS[1] * period:  # the pulse for the second length does for the first
-            probes = _rungs(np.geomspace(first, 2.0 * max(end, HORIZONS[1] * period), PROBES), longest, unit)
+    second, end = LONGER_BY * HORIZON * period, HORIZON * period
+    while True:
+        if linear_until < 0.0 or end > second:  # the pulse for the second length does for the first
+            probes = _rungs(np.geomspace(first, 2.0 * max(end, second), PROBES), longest, unit)
             linear = probes[: excitation.choose_pulse(probes)]
             linear_until = 0.5 * sum(rung.duration for rung in linear) if len(linear) < len(probes) else np.inf
         ladder = _rungs(_points(first, min(end, linear_until)), longest, unit)
         tangent, before = Tangent(copy(excitation), ladder, len(ladder), unit=unit), found
         found = tangent if before is None or len(tangent.state) >= len(before.state) else before
-        if end >= linear_until or (before is not None and len(tangent.state) <= len(before.state)):
+        is_complete = before is not None and len(tangent.state) <= len(before.state)
+        if end >= linear_until or (is_complete and (end >= until or found.foretells(until, longest))):
             break
-    assert found is not None
+        if LONGER_BY * end > LAST_HORIZON * max(period, until):
+            break
+        end *= LONGER_BY
     _prove(found, step)
     return _above_rounding(found, step)
 

@@ -7,6 +7,7 @@ part of a loop. Restored to such states, the component shows the derivatives of 
 has to predict the response to a random input.
 """
 
+import math
 import sys
 from collections.abc import Sequence
 from copy import copy
@@ -50,8 +51,13 @@ SMALL = 0.01
 """Share of the largest response, below which one at the end counts as that much"""
 FAST = 3.0
 """Growth of a response in a step, from which it is told as the reason why states are not seen"""
+EXACT = 1e-9
+"""Error of a tangent in continuous time, relative, up to which its pulse and its ladder are kept"""
+FORETOLD = 16
+"""Points of time at which a later response is foretold"""
 LINEAR = 1e-6
-"""Error allowed of what is predicted at another point of rest or from an initial state, relative to the largest"""
+"""Error allowed of what is predicted at another point of rest, from an initial state or much later, relative to the
+largest"""
 
 
 ROUNDED = 4.0 * float(np.finfo(float).eps)
@@ -209,6 +215,28 @@ class Tangent(LinearSimulator):
                 f"response to a random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, "
                 f"expected at most {UNPROVEN:g}"
             )
+
+    def foretells(self, end: float, longest: float) -> bool:
+        """Whether it predicts the response to a pulse up to a later time [s], in steps of `longest` at most.
+
+        It differs by no more than measurement explains: rounding, and as responses to two sizes of pulses differ.
+        """
+        excitation, cut = self._excitation, len(self.outputs)
+        count = max(1, math.ceil(end / FORETOLD / longest - 1e-6))
+        rungs = [Rung(count, self.unit or end / FORETOLD / count)] * FORETOLD
+        by_state, by_input = self.derivatives(rungs[0].h)
+        for i in range(len(self.inputs)):
+            once, other = excitation.two_sizes(i, rungs, excitation.response)
+            predicted, state = np.zeros_like(once), np.zeros(len(self.state))
+            for k in range(len(once) * count):
+                after = by_state @ state
+                if k < count:
+                    after += by_input[:, i] * excitation.scale[i]
+                predicted[k // count], state = after[:cut] / excitation.weight, after[cut:]
+            allowed = max(EXACT, min(STANDS_OUT * self.rounding, LINEAR)) * np.abs(once).max(initial=0.0)
+            if (np.abs(once - predicted) > allowed + STANDS_OUT * np.abs(once - other)).any():
+                return False
+        return True
 
     def prove_held(self, h: float, samples: int = 1) -> None:
         """Compare its responses to inputs that are held, in steps of `h` [s], with those of the component.

@@ -45,6 +45,7 @@ from orchestration.theory.stability.operating_point import (
     hyperperiod_of,
     latest_offset,
     longest_period,
+    periods_of,
     time_to_rest,
 )
 from orchestration.theory.stability.periodic_schedule import common_period, periodic_schedule
@@ -172,7 +173,7 @@ class AtRest:
     def slowest(self) -> Fraction:
         """The longest time after which a sampled component responds as before [ns].
 
-        What is in continuous time is measured for it: it serves in all hyperperiods of these components with others.
+        What is in continuous time foretells as much: it serves in all hyperperiods of these components with others.
         """
         system = self.simulation.system
         sampled = [name for name, one in system.components.items() if one.sampling is not None]
@@ -227,10 +228,12 @@ class AtRest:
         component = self.simulation.system.components[name]
         if component.sampling is not None:
             return of_samples(rest, component.sampling.period)
-        period = float(self.slowest) / NANOSECONDS
-        step = component.step or period
+        quickest, slowest = (
+            float(each) / NANOSECONDS for each in (min(periods_of(self.simulation.system)), self.slowest)
+        )
+        step = component.step or quickest
         unit = None if model.varies_step else step
-        return self._kept(name, in_continuous_time(rest, period, step, unit=unit))
+        return self._kept(name, in_continuous_time(rest, quickest, step, until=slowest, unit=unit))
 
     def rest_of(self, name: str) -> Rest:
         """A component at rest: the last inputs and time, and the variables that belong to the loop."""

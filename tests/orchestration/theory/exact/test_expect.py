@@ -261,8 +261,8 @@ def test_the_limit_of_losses_has_the_mean_square_limit_of_theory(burst: float | 
     assert found.mean_square_limit == pytest.approx(expected, abs=1e-6)
     (note,) = (note for note in found.notes if note.startswith("just above "))
     bad = 0.3 if expected > 0.2 else 0.2
-    tried = f"nor at what was tried above, up to {bad}; other values above may have one again"
-    assert note.endswith(f" means of squares have no finite expectation, {tried}")
+    tried = f"nor have they at what was tried above, up to {bad}; other values above may have one again"
+    assert note.endswith(f" means of squares have no finite expectation; {tried}")
 
 
 def test_a_limit_of_a_loop_without_chance_has_no_mean_square_limit() -> None:
@@ -427,9 +427,9 @@ def test_a_plant_is_measured_once_for_shorter_periods_to_the_accuracy_of_a_radiu
     models, measured = files_of(systems[0]).models, list[float]()
     exact = [mean_square.growths_of([system], models)[0].radius for system in systems]
 
-    def counted(rest: Rest, period: float, step: float, *, unit: float | None) -> Tangent:
+    def counted(rest: Rest, period: float, step: float, *, until: float, unit: float | None) -> Tangent:
         measured.append(period)
-        return in_continuous_time(rest, period, step, unit=unit)
+        return in_continuous_time(rest, period, step, until=until, unit=unit)
 
     monkeypatch.setattr("orchestration.theory.stability.loop_at_rest.in_continuous_time", counted)
     radii = [one.radius for one in mean_square.growths_of(systems, models)]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from orchestration.foundation.basics.simulator import Floats, Transfer
 from orchestration.theory.stability import matrices
@@ -150,6 +151,39 @@ def test_what_has_only_nearly_come_to_rest_and_falls_away_shows_no_further_state
     after = np.exp(0.0005 * (2.0 * 9.81 / 0.01) ** 0.5 * np.array([-1.0, 1.0]))
     after = np.sort([np.exp(-250.0 * 0.0005), *after])
     assert np.sort(np.linalg.eigvals(found.derivatives(0.0005)[0][1:]).real) == pytest.approx(after, rel=1e-4)
+
+
+class Creeping(Line):
+    """A fast state that the output shows, and one that creeps after it, which it shows by a share."""
+
+    simulated = 0.0
+
+    def __init__(self, share: float) -> None:
+        self.kept, self.u, self.share = np.zeros(2), 0.0, share
+
+    def reader(self, names: Any, into: Floats) -> Transfer:
+        def read() -> None:
+            into[0] = 1.0 + self.kept[0] + self.share * self.kept[1]
+
+        return read
+
+    def step(self, t: float, h: float) -> None:
+        self.simulated += h
+        flow = expm(h * np.array([[-50.0, 0.0, 50.0], [1.0, -0.01, 0.0], [0.0, 0.0, 0.0]]))
+        self.kept = (flow @ np.append(self.kept, self.u))[:2]
+
+
+def test_of_rates_far_apart_a_plant_is_measured_over_the_shortest_and_foretells_the_longest() -> None:
+    plant = Creeping(0.1)
+    found = in_continuous_time(rest(plant), 0.001, 0.001, until=10.0)
+    rates = np.log(np.sort(np.linalg.eigvals(found.derivatives(0.001)[0][1:]))) / 0.001
+    assert rates == pytest.approx([-50.0, -0.01], rel=1e-4)
+    assert plant.simulated < 10.0 * 10.0
+    plant = Creeping(0.0)
+    found = in_continuous_time(rest(plant), 0.001, 0.001)
+    assert found.foretells(10.0, 0.1)
+    plant.share = 1e-4
+    assert not found.foretells(10.0, 0.1)
 
 
 class Alternating(Line):
