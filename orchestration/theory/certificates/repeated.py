@@ -22,8 +22,8 @@ from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import PlacedTask, placed_tasks
 from orchestration.theory.certificates.breaking import FINE, SCAN
 from orchestration.theory.certificates.causes import EXECUTION, Cause
+from orchestration.theory.exact.examined_limit import RADIUS_TOLERANCE
 from orchestration.theory.exact.loops import Loops
-from orchestration.theory.exact.mean_square import RADIUS_TOLERANCE
 from orchestration.theory.stability.delay_bounds import patterns
 from orchestration.theory.stability.operating_point import deterministic
 

@@ -30,9 +30,9 @@ class Moving(NamedTuple):
 
     what: str
     below: str
-    """What they do where the radius is below 1"""
+    """Verb for them where the radius is below 1"""
     above: str
-    """and else"""
+    """Verb for them else"""
 
 
 DEVIATIONS = Moving("small deviations", "decay", "grow")
