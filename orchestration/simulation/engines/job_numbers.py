@@ -1,10 +1,11 @@
 """Terms of expressions about jobs and frames: numbers of a run that do not depend on signals."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from orchestration.foundation.basics.errors import UsageError, expected_name
+from orchestration.foundation.basics.errors import UsageError, expected_name, prefixed
 from orchestration.foundation.basics.times import seconds
 from orchestration.systems.computers.timeline import Frames, Jobs, Timeline
 from orchestration.systems.expressions import syntax
@@ -20,15 +21,16 @@ def job_numbers(system: System) -> dict[str, float]:
 
     Raises `UsageError` for an unknown task, and for a term with jobs of several tasks.
     """
-    terms = job_terms(expression for _, expression in expressions(system))
+    terms = {term: place for place, expression in reversed(expressions(system)) for term in job_terms([expression])}
     if not terms:
         return {}
     timeline = timeline_of(system)
     values = {}
-    for name in terms:
+    for name, place in terms.items():
         call = syntax.parse_job_measures(name)
         assert isinstance(call, syntax.Call)
-        value = evaluate({name: _at_jobs(call)}, lambda call=call: iter([_recorded(timeline, call)]))[name]  # type: ignore[misc]
+        with prefixed(f"{place}: "):
+            value = evaluate({name: _at_jobs(call)}, lambda call=call: iter([_recorded(timeline, call)]))[name]  # type: ignore[misc]
         values[name] = np.nan if value is None else value
     return values
 
@@ -82,5 +84,8 @@ def _jobs(timeline: Timeline, of: syntax.JobMeasure) -> Jobs | Frames:
     matching = [name for name in every if of.task in (name, name.partition(".")[2])]
     if of.task in every or len(matching) == 1:
         return every[of.task if of.task in every else matching[0]]
-    expected = f"one of {', '.join(matching)}" if matching else expected_name(of.task, list(every))
-    raise UsageError(f"{syntax.text(of)}: {expected}")
+    if not matching:
+        raise UsageError(f"{syntax.text(of)}: {expected_name(of.task, list(every))}")
+    kinds = (f"{'task' if name in timeline.jobs else 'message'} {name}" for name in matching)
+    wanted = " or ".join(syntax.text(replace(of, task=name)) for name in matching)
+    raise UsageError(f"{syntax.text(of)}: {' and '.join(kinds)} have that name; expected {wanted}")

@@ -13,6 +13,7 @@ from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import nanoseconds
 from orchestration.foundation.recording.recording import KINDS
 from orchestration.simulation.engines.batch.batches import Batches
+from orchestration.simulation.engines.job_numbers import job_numbers
 from orchestration.simulation.runs.pause import fly_until, resume
 from orchestration.simulation.runs.run_directory import load_run
 from orchestration.systems.schedule import instant_arrays
@@ -158,6 +159,17 @@ def test_what_cannot_be_said_of_jobs_is_refused(fmu: Path, objective: str, compl
             loop(fmu, Component(fmu="stub"), computers=on_a_computer(period=0.02), objectives={"x": objective}),
             "python",
         )
+
+
+def test_a_name_of_two_tasks_is_refused_with_the_names_that_tell_them_apart(fmu: Path) -> None:
+    computers = {**on_a_computer(period=0.02), "two": Computer(tasks={"control": Task(period=0.1)})}
+    what = loop(fmu, Component(fmu="stub"), computers=computers, objectives={"x": "max(missed(control))"})
+    with pytest.raises(
+        UsageError,
+        match=r"^objectives\.x: missed\(control\): task one\.control and task two\.control have that name; "
+        r"expected missed\(one\.control\) or missed\(two\.control\)$",
+    ):
+        job_numbers(what)
 
 
 def test_a_component_of_fixed_steps_beside_a_task_needs_to_move(tmp_path: Path, fmu: Path) -> None:
