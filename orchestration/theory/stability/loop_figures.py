@@ -1,13 +1,15 @@
 """Figures of loops: over the frequency, after a step, and their poles over a quantity."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.text import Annotation
 from matplotlib.ticker import MultipleLocator
 
 from orchestration.foundation.basics.simulator import Floats
@@ -42,12 +44,24 @@ ROW = 0.12
 """Height of one, as a share of that of the curve"""
 WIDTH = 0.6
 """Width of a character, as a share of its height"""
-EDGE = 0.25
-"""Share of the width, from a side, in which a label has no room towards it"""
 CALM = 3.0
 """Settling times of the slowest loop after which the axis of a step ends"""
 LEAST = 1e-12
 """Least gain that is drawn: less is rounding, as of a slow task beyond half its own rate"""
+
+SIDEWAYS: Sequence[dict[str, Any]] = (
+    {"xytext": (5.0, 0.0), "va": "center"},
+    {"xytext": (-5.0, 0.0), "va": "center", "ha": "right"},
+)
+ACROSS: Sequence[dict[str, Any]] = (
+    {"xytext": (0.0, -3.0), "va": "top", "ha": "center"},
+    {"xytext": (0.0, 3.0), "va": "bottom", "ha": "center"},
+)
+"""Ways to write beside a point"""
+FAR = 3.0
+"""Factor on the distance, and on its further steps, where there is no room"""
+Label: TypeAlias = tuple[Axes, str, str, list[tuple[float, float, dict[str, Any]]]]
+"""A text with its color, and the points beside which it may be, and in which way, the best first"""
 
 
 def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
@@ -55,7 +69,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     figure = style.figure(66.0)
     above, middle, below = figure.subplots(3, sharex=True)
     several = len(result.outputs) > 1
-    margins = [0.0]
+    margins, labels = [0.0], list[Label]()
     for i, (gain, phase, output) in enumerate(zip(result.gains, result.phases, result.outputs, strict=True)):
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
@@ -68,7 +82,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
         below.plot(result.frequencies, _decibels(np.abs(1.0 / (1.0 + gain))), **how)
         if loop is not None:
             margins.append(critical_phase(loop, result.frequencies, phase) + min(0.0, loop.phase_margin or 0.0))
-            _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=not several)
+            labels += _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=not several)
     if not result.stable:
         above.set_title("closed, the loop is unstable: it has no margins")
     for axes in (above, below):
@@ -93,6 +107,7 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
     for axes in (below, hertz):
         plain(axes.xaxis)
     figure.legend(loc="outside lower center", ncols=2)
+    _label_freely(figure, labels)
     return figure
 
 
@@ -108,8 +123,8 @@ def _sizes(loop: LoopMargins) -> str:
 
 def _mark_margins(
     panels: tuple[Axes, Axes], loop: LoopMargins, frequencies: Floats, phase: Floats, color: str, *, labelled: bool
-) -> None:
-    """The margins as lines at their crossovers, from where they would be none, with their sizes beside the middle."""
+) -> list[Label]:
+    """The margins as lines at their crossovers, from where they would be none; their sizes, and places for them."""
     above, middle = panels
     lines = [
         (above, at, 0.0, -decibels, f"× {one.factor:.3g} ({decibels:.3g} dB)")
@@ -121,23 +136,43 @@ def _mark_margins(
         above.plot(loop.crossover, 0.0, "o", color=color)
         reached = float(np.interp(loop.crossover, frequencies, phase))
         lines.append((middle, loop.crossover, reached - loop.phase_margin, reached, f"{loop.phase_margin:.3g}°"))
+    labels = list[Label]()
     for axes, at, none, end, size in lines:
         axes.plot([at, at], [none, end], color=color, linewidth=2.0, clip_on=False)
         if not labelled:
             continue
-        beside: dict[str, Any]
-        if axes is above:  # where a gain falls there is room below it to the left, and above it to the right
-            first, last = np.log(frequencies[[0, -1]])
-            share, place = (math.log(at) - first) / (last - first), 0.5 * (none + end)
-            beside = {"xytext": (5.0, 0.0), "va": "center"}
-            if end > none and share > EDGE:
-                beside = {"xytext": (-5.0, 0.0), "va": "center", "ha": "right"}
-            elif share > 1.0 - EDGE:
-                place, beside = none, {"xytext": (0.0, 3.0), "ha": "right"}
-            axes.annotate(size, (at, place), textcoords="offset points", color=color, **beside)
-        else:
-            beside = {"xytext": (0.0, -3.0), "va": "top"} if end > none else {"xytext": (0.0, 3.0)}
-            axes.annotate(size, (at, none), textcoords="offset points", ha="center", color=color, **beside)
+        near = [(0.5 * (none + end), SIDEWAYS), (none, SIDEWAYS), (end, SIDEWAYS)]
+        near.insert(0 if axes is middle else 1, (none, ACROSS if end > none else ACROSS[::-1]))
+        far = [(at, none, {**how, "xytext": (0.0, FAR * how["xytext"][1] * k)}) for k in (1, 2, 3) for how in ACROSS]
+        labels.append((axes, size, color, [(at, place, how) for place, ways in near for how in ways] + far))
+    return labels
+
+
+def _label_freely(figure: Figure, labels: Sequence[Label]) -> None:
+    """Each label at the first of its places where it crosses no line and no other label, or the fewest."""
+    figure.draw_without_rendering()  # so that axes have their sizes
+    for axes, size, color, places in labels:
+        curves = [
+            (each.get_transform().transform_path(each.get_path()), 1 if each.get_linestyle() == ":" else 10)
+            for each in axes.lines
+        ]
+        others = [each.get_window_extent() for each in axes.texts]
+
+        def crossed(text: Annotation, curves: Any = curves, others: Any = others, axes: Axes = axes) -> int:
+            box = text.get_window_extent()
+            inside = axes.bbox.containsx(box.x0) and axes.bbox.containsx(box.x1)
+            inside = inside and axes.bbox.containsy(box.y0) and axes.bbox.containsy(box.y1)
+            across = sum(weight for path, weight in curves if path.intersects_bbox(box, filled=False))
+            return int(across + 10 * box.count_overlaps(others) + (0 if inside else 100))
+
+        texts = [
+            axes.annotate(size, (at, place), textcoords="offset points", color=color, **how)
+            for at, place, how in places
+        ]
+        best = min(texts, key=crossed)
+        for text in texts:
+            if text is not best:
+                text.remove()
 
 
 def step_figure(result: Step, style: Style = SCREEN) -> Figure:

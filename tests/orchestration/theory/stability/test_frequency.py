@@ -376,3 +376,20 @@ def test_a_phase_margin_is_drawn_from_a_dotted_line(start: float, end: float, cr
     dotted = [float(np.asarray(line.get_ydata())[0]) for line in phase.lines if line.get_linestyle() == ":"]
     assert critical in dotted
     assert phase.get_ylim()[0] < critical
+
+
+def test_the_size_of_a_margin_crosses_no_curve_where_the_gain_is_1_beside_a_resonance() -> None:
+    """As that of an elastic shaft, at two thirds of the frequency of the margin, between a notch and a flat end."""
+    frequencies = np.geomspace(1.0, 1500.0, 1501)
+    at = 1j * frequencies
+    gains = np.array([(at**2 + 6.0 * at + 200.0**2) / (at**2 + 30.0 * at + 360.0**2) / at / (at + 12.0)])
+    gains /= np.interp(420.0, frequencies, np.abs(gains[0]))
+    (known,) = bode_of("dc_servo").loops
+    margin = GainMargin(factor=1.0 / float(np.interp(560.0, frequencies, np.abs(gains[0]))), frequency=560.0)
+    loop = dataclasses.replace(known, crossover=420.0, gain_margins=(margin,))
+    drawn = dataclasses.replace(bode_of("dc_servo"), loops=(loop,), frequencies=frequencies, gains=gains)
+    gain, *_ = drawn.plot()["bode"].axes
+    curve, (size,) = gain.lines[0], gain.texts
+    box, path = size.get_window_extent(), curve.get_transform().transform_path(curve.get_path())
+    assert not path.intersects_bbox(box, filled=False)
+    assert gain.bbox.containsx(box.x1)
