@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from orchestration.experiments.studies.axes import SCALES, Axis, name_of, quantity_of
+from orchestration.experiments.studies.axes import SCALES, Axis, name_of, names_of, quantity_of
 from orchestration.experiments.studies.cell_texts import (
     groups_along,
     letters_of,
@@ -15,6 +15,7 @@ from orchestration.experiments.studies.cell_texts import (
     numbers_averaged,
     repetitions,
     title_of,
+    two_laws,
 )
 from orchestration.experiments.studies.figures import make_room, mark_edge
 from orchestration.experiments.studies.shares import (
@@ -25,6 +26,7 @@ from orchestration.experiments.studies.shares import (
     REMARK,
     WITH_VALUE,
     averages_of,
+    differences_in,
     is_unknown,
     judged_by,
     left_out,
@@ -35,11 +37,14 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.simulation.figures.lines import abreast
 from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, MARKS
 from orchestration.simulation.figures.style import SCREEN, Style
+from orchestration.simulation.results import display_names as labels
 from orchestration.theory.exact.mean_square import NO_EXPECTATION
 
 if TYPE_CHECKING:
     import pandas as pd
 
+HEIGHTS = (3.0, 1.0)
+"""Heights of the panel of the lines and of that of their difference, relative"""
 ROW = 0.05
 """Share of the height of a panel that a row of numbers takes"""
 _NO_VALUE, _SOME, _UNKNOWN = "no value", "some runs left out", "not examined"
@@ -66,11 +71,14 @@ def cell_lines(
     `laws` is an axis of names, such as controllers: a line for each. A mark is hollow where some runs are left out;
     crosses at the lower edge are values without an average, and signs of infinity at the upper one means without a
     finite expectation, which are not drawn. A question mark is beside one that may have none. The numbers of runs
-    averaged stand at the upper edge, in a row for each line, where there is room.
+    averaged stand at the upper edge, in a row for each line, where there is room. Of two laws a panel below has their
+    difference, of shares, or of a metric in the pairs of runs that are both averaged.
     """
     across = quantity_of(axis, units)
-    figure = style.figure(32.0)
-    panel = figure.add_subplot()
+    both = two_laws(laws)
+    figure, rows = style.figure(32.0 if both is None else 42.0), 1 if both is None else 2
+    panels = figure.subplots(rows, sharex=True, squeeze=False, height_ratios=HEIGHTS[:rows])
+    panel = panels[0, 0]
     names = names_in(axis, laws)
     found = shares_of(table if average == MEDIAN else judged_by(table, metric), names)
     shown = found if metric == GOOD else averages_of(table, names, metric, average)
@@ -105,8 +113,8 @@ def cell_lines(
             panel.fill_between(at, group["low"], group["high"], color=how["color"], alpha=0.15, linewidth=0.0)
     most = max((len(count) for row in numbers.values() for _, count in row), default=0)
     numbered = bool(most) and (most + 1) * found[axis.name].nunique() <= letters_of(style, 1)
+    panels[-1, 0].set_xlabel(across.title)
     panel.set(
-        xlabel=across.title,
         ylabel=title_of(metric, words, units, average, numbered=numbered, repeats=True),
         xscale=SCALES[axis.scale],
     )
@@ -124,19 +132,39 @@ def cell_lines(
     if hollow:
         panel.plot([], [], "o", color=BLACK if laws else BLUE, label=_SOME, **HOLLOW)
     if laws is not None or without or unknown or lacking or hollow:
-        names = [law for law, _ in groups]
+        shown_as = [law for law, _ in groups]
         there = {NO_EXPECTATION: without, _UNKNOWN: unknown, _NO_VALUE: lacking, _SOME: hollow}
-        names += [name for name, some in there.items() if some]
+        shown_as += [name for name, some in there.items() if some]
         title = None if laws is None else name_of(laws)
-        figure.legend(loc="outside lower center", title=title, ncols=abreast(names, style))
+        figure.legend(loc="outside lower center", title=title, ncols=abreast(shown_as, style))
     said = [repetitions(found, metric)]
     if metric != GOOD:
         said += [f"bars: 95 % intervals {INTERVALS[average]}, where runs suffice"] if said[0] else []
         said += [left_out(shown, words[0]), remarked(shown)]
+    if both is not None:
+        found = differences_in(table, names, both, metric, average)
+        _draw_difference(panels[1, 0], across.of(found[axis.name]), found)
+        unit = None if metric == GOOD else units.get(metric)
+        panels[1, 0].set_ylabel(labels.metric_with_unit("difference", unit))
+        minus, kind = names_of(both[1:]), "by Newcombe for pairs" if metric == GOOD else INTERVALS[average]
+        of = "shares" if metric == GOOD else f"the {average} of pairs"
+        panels[1, 0].set_title(f"{minus[both.second]} minus {minus[both.first]}", fontsize="small")
+        said.append(f"below: difference of {of}, 95 % intervals {kind}")
     good = "" if average == MEAN else f"{words[0]} "
     said += [f"crosses: no {good}run with a value {' and '.join(lacks)}"] if lacks else []
     style.set_title(figure, "; ".join(filter(None, said)))
     return figure
+
+
+def _draw_difference(panel: Axes, at: Floats, found: "pd.DataFrame") -> None:
+    """The differences of two laws with their intervals; those without a finite expectation are at the upper edge."""
+    infinite = found[REMARK].eq(NO_EXPECTATION) if REMARK in found else found["difference"].isna() & False
+    found = found.assign(difference=found["difference"].mask(infinite))
+    ends = np.abs(found[["low", "high"]].to_numpy().T - found["difference"].to_numpy())
+    panel.axhline(0.0, color=BLACK, linewidth=0.6)
+    panel.errorbar(at, found["difference"], ends, color=BLACK, marker="o", markersize=3.0, linewidth=0.8, capsize=2.5)
+    if infinite.any():
+        mark_edge(panel, {BLACK: at[infinite]}, **INFINITY)
 
 
 def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, str]]]) -> float:

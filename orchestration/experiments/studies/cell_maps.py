@@ -24,6 +24,7 @@ from orchestration.experiments.studies.cell_texts import (
     numbers_averaged,
     repetitions,
     title_of,
+    two_laws,
     write_counts,
 )
 from orchestration.experiments.studies.shares import (
@@ -32,7 +33,6 @@ from orchestration.experiments.studies.shares import (
     MEDIAN,
     REMARK,
     WITH_VALUE,
-    TwoLaws,
     averages_of,
     cells_in_words,
     differences_in,
@@ -93,7 +93,7 @@ def cell_maps(
     found["unknown"] = is_unknown(averages[REMARK]) if average == MEAN else False
     found["value"] = found["value"].mask(found["without"])
     groups = groups_along(found, third, units)
-    both = _two_laws(third)
+    both = two_laws(third)
     count = len(groups) + (both is not None)
     columns = min(count, 3 if style.is_wide else 1 if count <= 3 else 2)
     columns = 2 if count == 4 and columns == 3 else columns  # no row with a single panel
@@ -200,12 +200,6 @@ class _Cells:
         """Places and texts of as many values as have room, for cells that are equally wide."""
         places = [*range(0, len(self.shown), math.ceil(len(self.shown) / max(1.0, math.floor(most))))]
         return places, [f"{self.shown[i]:g}" for i in places]
-
-
-def _two_laws(axis: Axis | None) -> TwoLaws | None:
-    if axis is None or axis.is_numeric or len(axis.values or ()) != 2:
-        return None
-    return TwoLaws(axis.name, *map(str, axis.values or ()))
 
 
 def _grid(table: "pd.DataFrame", axes: tuple[Axis, Axis], column: str) -> Floats:

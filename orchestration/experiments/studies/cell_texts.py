@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from orchestration.experiments.studies.axes import Axis, names_of, quantity_of
-from orchestration.experiments.studies.shares import GOOD, MEAN, WITH_VALUE
+from orchestration.experiments.studies.shares import GOOD, MEAN, WITH_VALUE, TwoLaws
 from orchestration.simulation.figures.palette import BLACK
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results import display_names as labels
@@ -39,6 +39,13 @@ def groups_along(
     if axis.is_numeric:
         named = {value: f"{of.name} {of.text_of(float(value))}" for value in sorted(map(float, values))}
     return [(name, table[table[axis.name] == value]) for value, name in named.items()]
+
+
+def two_laws(axis: Axis | None) -> TwoLaws | None:
+    """The two laws of an axis of two names, of which there is a difference; None: it is no such axis."""
+    if axis is None or axis.is_numeric or len(axis.values or ()) != 2:
+        return None
+    return TwoLaws(axis.name, *map(str, axis.values or ()))
 
 
 def letters_of(style: Style, columns: int) -> float:

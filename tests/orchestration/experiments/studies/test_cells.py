@@ -381,6 +381,21 @@ def test_shares_over_one_axis_are_a_line_with_a_band_for_each_law() -> None:
     assert panel.get_ylabel() == "share of settled runs"
 
 
+def test_two_laws_over_one_axis_have_their_difference_below_with_the_intervals_of_the_table() -> None:
+    laws = TwoLaws("controller", *map(str, LAWS.values or ()))
+    table, names = runs(), ["controller", "timing.loss"]
+    for metric, average in (("good", "median"), ("position_rmse", "mean")):
+        figure = cell_lines(table, LOSSES, LAWS, metric, WORDS, units={}, average=average)
+        below, found = figure.axes[1], differences_in(table, names, laws, metric, average)
+        (drawn,) = below.containers
+        assert np.asarray(drawn[0].get_ydata()).tolist() == found["difference"].tolist()
+        (bars,) = drawn[2]
+        ends = [[low for (_, low), _ in bars.get_segments()], [high for _, (_, high) in bars.get_segments()]]
+        np.testing.assert_allclose(ends, found[["low", "high"]].to_numpy().T)
+        assert below.get_title() == "CascadedController minus UnifiedController"
+    assert len(cell_lines(table, LOSSES, None, "good", WORDS, units={}).axes) == 1
+
+
 def test_medians_have_their_counts_and_a_paper_has_no_titles() -> None:
     figure = cell_lines(runs(), LOSSES, LAWS, "position_rmse", WORDS, units={}, style=STYLES["paper"])
     texts = figure.axes[0].texts
