@@ -4,7 +4,7 @@ Whatever the execution times are, a component samples within a window after its 
 within another. A loop that no sequence of draws from these windows makes unstable is stable on that computer.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from orchestration.foundation.basics.bisection import bisected
@@ -17,7 +17,7 @@ from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.systems.system.placement import placed_messages, placed_tasks
 from orchestration.theory.certificates.breaking import FINE
-from orchestration.theory.certificates.certified_loop import JITTER, LATENCY, SHIFT, CertifiedLoop, Varying
+from orchestration.theory.certificates.certified_loop import JITTER, LATENCY, SHIFT, CertifiedLoop, Draws, Varying
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
 
@@ -74,23 +74,38 @@ class ScheduledLoop:
 
     def family(self, value: float) -> LoopFamily:
         """The family for draws up to a value [s]; raises `UsageError` as above."""
+        timeline, largest, largest_sum = self._timeline(value)
+        return timeline.family(largest, largest_sum=largest_sum)
+
+    def _timeline(self, value: float) -> tuple[LoopTimeline, list[float], float | None]:
+        """The timeline, and the largest draws and their largest sum."""
         windows = self._windows(value)
         timeline = LoopTimeline(replace(self._loop, system=self._earliest_system(windows)), self._varying(windows))
         largest_sum = [window.together / NANOSECONDS for window in windows.values() if not window.is_certain]
-        return timeline.family(_widths(windows), largest_sum=largest_sum[0] if largest_sum else None)
+        return timeline, _widths(windows), largest_sum[0] if largest_sum else None
+
+    def _draws(self, value: float) -> Draws:
+        """The draws up to a value [s], of which the family takes long; raises `UsageError` where they are refused."""
+        timeline, largest, largest_sum = self._timeline(value)
+        return timeline.draws(largest, largest_sum)
 
     def largest(self) -> float:
         """The largest value for which there is a family [s]."""
+        largest = self._last(self._draws)
+        return largest if not self.refusal(largest) else self._last(self.family)
+
+    def _last(self, of: Callable[[float], object]) -> float:
+        """The largest value that is not refused [s]."""
 
         def fails(value: float) -> bool:
-            return bool(self.refusal(value))
+            return bool(self.refusal(value, of))
 
         return floor_to_nanoseconds(bisected(fails, 0.0, self._cause.period, self.tolerance).good or 0.0)
 
-    def refusal(self, value: float) -> str:
+    def refusal(self, value: float, of: Callable[[float], object] | None = None) -> str:
         """Why there is no family for draws up to a value [s]; empty where there is one."""
         try:
-            self.family(value)
+            (of or self.family)(value)
         except UsageError as error:
             return str(error).removeprefix(f"{self._cause.path}: ")
         return ""

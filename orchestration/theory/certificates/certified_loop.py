@@ -123,13 +123,6 @@ class Draws:
         bend = min(max(self.largest_sum - self.largest[1], 0), self.largest[0])
         return [(x, y) for x in (0, bend, self.largest[0]) for y in (0, self._largest_second(x))]
 
-    def boxes(self) -> list[tuple[tuple[int, int], ...]]:
-        """The ends, along each quantity, of boxes that cover all draws of two of them."""
-        first, second = self.largest
-        count = 1 if self.largest_sum >= first + second else BOXES
-        ends = [first * i // count for i in range(count + 1)]
-        return [((low, high), (0, self._largest_second(low))) for low, high in itertools.pairwise(ends)]
-
     def _largest_second(self, first: int) -> int:
         """The largest value of the second quantity for one of the first."""
         return min(self.largest[1], self.largest_sum - first)

@@ -13,7 +13,7 @@ from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.model import System
 from orchestration.theory.certificates.certified_loop import CertifiedLoop, Point
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
-from orchestration.theory.exact.branch import BranchEvent, Piece
+from orchestration.theory.exact.branch import BranchEvent, Mode, Piece
 from orchestration.theory.exact.effects import ContinuousEffects, Places
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask
 from orchestration.theory.exact.timing_chain import TimingChain
@@ -142,6 +142,7 @@ class Courses:
         self._effects = RecordedEffects(loop.system, loop.components, [task.name for task in tasks], lossy)
         self._known: dict[tuple[Point, bool], list[Steps]] = {}
         self._jumps: dict[str, Jump] = {}
+        self._mode: Mode | None = None
 
     def of(self, piece: int, *, lost: bool) -> PieceAt:
         """A piece in which all messages are lost, or none."""
@@ -151,7 +152,8 @@ class Courses:
         if (point, lost) not in self._known:
             self._effects.loses = lost
             chain = TimingChain(*self._timing(point), self._effects, order=1, cuts=self.begins)
-            parts, first = chain.repeating(), [chain.cuts.index(begin) for begin in self.begins]
+            parts, self._mode = chain.repeating(self._mode)
+            first = [chain.cuts.index(begin) for begin in self.begins]
             counts = [(b - a) % len(parts) or len(parts) for a, b in zip(first, [*first[1:], first[0]])]
             self._known[point, lost] = [
                 _joined([parts[(a + k) % len(parts)] for k in range(count)]) for a, count in zip(first, counts)
@@ -186,8 +188,37 @@ class Courses:
 
     def same(self, one: Steps, other: Steps, point: Point) -> bool:
         """Whether two courses have the same effect at a point."""
+        if _are_same(_at(one, point), _at(other, point)):
+            return True
         a, b = self._map(one, point), self._map(other, point)
         return bool((np.abs(a - b) <= SAME * np.abs(b).max(axis=1, keepdims=True)).all())
+
+    def gaps(self, steps: Steps) -> list[Point]:
+        """The times that vary from each event to those after it with which it may not change places."""
+        events, found = list[tuple[Point, Jump]](), dict[Point, None]()
+        at: Point = (0,) * max(len(step) for step in steps if isinstance(step, tuple))
+        for step in steps:
+            if isinstance(step, tuple):
+                at = tuple(a + b for a, b in zip(at, step))
+                continue
+            for before, other in events:
+                gap = tuple(b - a for a, b in zip(before, at))
+                if any(gap[1:]) and not self._commute(other, step):
+                    found[gap] = None
+            events.append((at, step))
+        return list(found)
+
+    def _commute(self, one: Jump, other: Jump) -> bool:
+        """Whether two events may change places: one of them commutes with what happens between, and with the other."""
+        a, b, F = self._whole(one), self._whole(other), self._flow
+        return np.array_equal(a @ b, b @ a) and any(np.array_equal(x @ F, F @ x) for x in (a, b))
+
+    def _whole(self, jump: Jump) -> Floats:
+        """The map of the whole state, of which an event changes nothing that it does not have."""
+        found = jump.matrix(self._effects.places_count)
+        others = np.setdiff1d(np.arange(len(found)), [*jump.before, *jump.after])
+        found[others, others] = 1.0
+        return found
 
     def _map(self, steps: Steps, point: Point) -> Floats:
         from scipy.linalg import expm
@@ -205,6 +236,19 @@ class Courses:
         """The generator of the flow between events."""
         more = self._effects.places_count - self._effects.size
         return np.pad(self._effects.F, (0, more))
+
+
+def _at(steps: Steps, point: Point) -> list[Jump | int]:
+    """Events at a point, and the time between those that are not of one instant."""
+    timed = [step if isinstance(step, Jump) else time_at(step, point) for step in steps]
+    return [step for step in timed if isinstance(step, Jump) or step]
+
+
+def _are_same(one: list[Jump | int], other: list[Jump | int]) -> bool:
+    """Whether events are the same ones at the same times."""
+    return len(one) == len(other) and all(
+        a == b if isinstance(a, int) or isinstance(b, int) else a.is_same(b) for a, b in zip(one, other)
+    )
 
 
 def _joined(parts: Sequence[Piece]) -> Steps:

@@ -22,7 +22,7 @@ MAX_INEQUALITIES = 1000
 """inequalities of a search: steps of the ladder that need more are skipped"""
 SEARCHED = 12
 """cells for which forms are searched; of two parameters the square root of that along each"""
-REFINEMENTS = {0: (1,), 1: (2, 4, 8), 2: (2, 4)}
+REFINEMENTS = {0: (1,), 1: (2, 4, 8), 2: (2, 4, 8, 16, 32)}
 """factors on the number of cells for the proof, by the number of parameters: cells are refined first, forms searched
 again second"""
 ROUNDS = 3

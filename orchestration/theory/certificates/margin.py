@@ -322,7 +322,8 @@ def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
     tried = largest if search.last is None else search.last
     most, not_sought = LargestCertified(), not_sought_for(scheduled.family(0.0))
     if search.breaking != 0.0 and not not_sought:
-        most = largest_certified(scheduled.family, [cause.path], top, progress)
+        shares = SHARES[-1:] if top == largest else SHARES  # all that is looked at is often stable
+        most = largest_certified(scheduled.family, [cause.path], top, progress, shares)
     return Certified(
         of=cause.path, certified=most.value, unproved=most.unproved, breaking=search.breaking,
         refused=scheduled.refusal(largest + scheduled.tolerance) if most.value == largest else "",

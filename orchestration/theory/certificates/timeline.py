@@ -5,13 +5,13 @@ of a piece follow one another in an order; where the order depends on the draw t
 for a single value at which events of one instant have an effect that no other value has.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, prefixed
 from orchestration.foundation.basics.times import NANOSECONDS
-from orchestration.foundation.basics.unit_algebra import quantity
 from orchestration.theory.certificates.certified_loop import (
+    BOXES,
     DELAY,
     JITTER,
     LATENCY,
@@ -22,8 +22,9 @@ from orchestration.theory.certificates.certified_loop import (
     Point,
     Varying,
 )
-from orchestration.theory.certificates.course import Courses, Jump, PieceAt, Steps, time_at
+from orchestration.theory.certificates.course import Courses, PieceAt, Steps
 from orchestration.theory.certificates.family import Letter, LoopFamily
+from orchestration.theory.certificates.orders import boxes_of, orders_of
 from orchestration.theory.exact.random_times import (
     ATTOSECONDS,
     RandomLink,
@@ -36,8 +37,6 @@ from orchestration.theory.exact.timing import links_of, sampled_tasks
 from orchestration.theory.stability.matrices import OF_FIXED_STEP
 from orchestration.theory.stability.operating_point import hyperperiod
 
-Same = Callable[[Steps, Steps, Point], bool]
-"""Whether two courses have the same effect at a point"""
 INSTANT = ATTOSECONDS // NANOSECONDS
 """Time by which the events of a draw are over before those of the next one begin"""
 
@@ -75,6 +74,14 @@ class LoopTimeline:
 
         At most `run` messages are lost in a row. Raises `UsageError` where two draws would be open at once.
         """
+        draws = self.draws(largest, largest_sum)
+        begin, _ = self._extent(draws.corners())
+        courses = Courses(self.loop, self._timing_at, self._begins(begin), self._lossy)
+        pieces = range(len(courses.begins))
+        return courses.family([x for i in pieces for x in self._letters(courses, draws, i, run if self._lossy else 0)])
+
+    def draws(self, largest: Sequence[float], largest_sum: float | None = None) -> Draws:
+        """The draws of a family; raises `UsageError` where two would be open at once."""
         limits = [attoseconds(exact_seconds(J)) for J in largest]
         draws = Draws(limits, sum(limits) if largest_sum is None else attoseconds(exact_seconds(largest_sum)))
         begin, end = self._extent(draws.corners())
@@ -82,9 +89,7 @@ class LoopTimeline:
             raise UsageError(
                 f"{self._paths_text()}: expected less, so that no message is open when the next one is drawn"
             )
-        courses = Courses(self.loop, self._timing_at, self._begins(begin), self._lossy)
-        pieces = range(len(courses.begins))
-        return courses.family([x for i in pieces for x in self._letters(courses, draws, i, run if self._lossy else 0)])
+        return draws
 
     # -- draws -------------------------------------------------------------------------------------------------------
 
@@ -161,7 +166,7 @@ class LoopTimeline:
         number = f" {piece + 1}" if pieces > 1 else ""
         found = []
         for lost, moves in zip((False, True), _moves((piece, pieces), run)):
-            for box, steps in self._boxes(courses.of(piece, lost=lost), courses.same, draws) if moves else ():
+            for box, steps in self._boxes(courses, courses.of(piece, lost=lost), draws) if moves else ():
                 name = ("lost" if lost else "arrives" if self._lossy else "late") + number
                 ranges = tuple((low / ATTOSECONDS, high / ATTOSECONDS) for low, high in box)
                 found.append(Letter(name=name, moves=moves, product=courses.product(steps), ranges=ranges))
@@ -172,76 +177,19 @@ class LoopTimeline:
             for i, letter in enumerate(found)
         ]  # fmt: skip
 
-    def _boxes(self, of: PieceAt, same: Same, draws: Draws) -> list[tuple[Box, Steps]]:
-        """Boxes of values, divided where two events change their order, and covering two of a limited sum."""
+    def _boxes(self, courses: Courses, of: PieceAt, draws: Draws) -> list[tuple[Box, Steps]]:
+        """Boxes of draws that cover them, divided where two events change their order, with their steps."""
         if not draws.largest:
             return [((), of(()))]
-        if len(draws.largest) == 1:
-            between = [*_orders(of, draws.largest[0])]
-            ends = sorted({0, *draws.largest, *(high for ((_, high),), _ in between)})
-            single: list[tuple[Box, Steps]] = [
-                (((end, end),), [(*step, 0) if isinstance(step, tuple) else step for step in of((end,))])
-                for end in ends
-                if not any(end in box and same(of((end,)), steps, (end,)) for (box,), steps in between)
-            ]
-            return sorted([*between, *single], key=lambda one: one[0])
-        corners = draws.corners()
-        middle = tuple(sum(along) // len(corners) for along in zip(*corners))
-        steps = _about(of, middle, [limit > 0 for limit in draws.largest])
-        times = [time_at(step, corner) for step in steps if isinstance(step, tuple) for corner in corners]
-        if min(times) < 0 or not all(same(of(corner), steps, corner) for corner in corners):
-            changes = self._changes_text(steps, corners)
-            raise UsageError(f"{self._paths_text()}: expected values that do not change the order of events; {changes}")
-        return [(box, steps) for box in draws.boxes()]
-
-    def _changes_text(self, steps: Steps, corners: Sequence[Point]) -> str:
-        """Which draws change the order of which events."""
-        owners = {DELAY: "delays of", LATENCY: "messages of"}
-        longest = [max(along) for along in zip(*corners)]
-        draws = " and ".join(
-            f"{owners.get(each.kind, 'samples of')} {each.name} up to {_text(most)} late"
-            for each, most in zip(self._timed, longest)
+        with prefixed(f"{self._paths_text()}: "):
+            orders = orders_of(of, courses.same, courses.gaps, draws.corners())
+        width = -(-draws.largest[0] // BOXES)
+        return sorted(
+            ((box, order.steps) for order in orders for box in boxes_of(order.region, width)), key=lambda one: one[0]
         )
-        for i, step in enumerate(steps):
-            times = [time_at(step, corner) for corner in corners] if isinstance(step, tuple) else [0]
-            if min(times) < 0:
-                before = [x.name for x in steps[:i] if isinstance(x, Jump)]
-                after = [x.name for x in steps[i + 1 :] if isinstance(x, Jump)]
-                if before and after:
-                    gaps = f"from {_text(max(times))} before to {_text(-min(times))} after"
-                    return f"with {draws}, '{before[-1]}' is {gaps} '{after[0]}'"
-        return f"with {draws}, events of one instant change theirs"
 
     def _paths_text(self) -> str:
         return " and ".join(dict.fromkeys(each.path for each in self.varying))
-
-
-def _orders(of: PieceAt, limit: int) -> Iterator[tuple[Box, Steps]]:
-    """The ranges of one quantity in which events have one order, from 0 to `limit`: each ends where a time vanishes."""
-    low = 0
-    while low < limit:
-        steps = _about(of, (low + 1,), [True])
-        high = min([limit, *(t[0] // -t[1] for t in steps if isinstance(t, tuple) and t[1] < 0)])
-        yield ((low, high),), steps
-        low = high
-
-
-def _text(time: int) -> str:
-    """A time [attoseconds] in its unit."""
-    return quantity(time / ATTOSECONDS, "s")
-
-
-def _about(of: PieceAt, point: Point, varies: Sequence[bool]) -> Steps:
-    """The steps about a point at which no two events that vary are at one time: times by the values of quantities."""
-    moved = [of((*point[:i], x + which, *point[i + 1 :])) for i, (x, which) in enumerate(zip(point, varies))]
-    found: Steps = []
-    for step, *others in zip(of(point), *moved, strict=True):
-        if isinstance(step, tuple):
-            added = [other[0] - step[0] for other in others if isinstance(other, tuple)]
-            found.append((step[0] - sum(s * x for s, x in zip(added, point)), *added))
-        else:
-            found.append(step)
-    return found
 
 
 def _moves(piece: tuple[int, int], run: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:

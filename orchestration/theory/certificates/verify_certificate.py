@@ -96,6 +96,7 @@ class _Enclosures:
             raise NotProven("the coordinates of the forms are not independent") from None
         self._last = coordinates * chosen
         self._factors: dict[tuple[Factor, Box], arb_mat] = {}
+        self._products: dict[tuple[Factor, ...], list[Factor | arb_mat]] = {}
         self._known: dict[tuple[int, Box], list[arb_mat]] = {}
 
     def letter_of(self, label: int) -> Letter:
@@ -121,22 +122,37 @@ class _Enclosures:
 
     def _map(self, letter: Letter, point: tuple[float, ...]) -> arb_mat:
         M = self._first
-        for factor in letter.product:
-            M = self._factor(factor, tuple((x, x) for x in point)) * M
+        for factor in self._joined(letter):
+            M = (factor if isinstance(factor, arb_mat) else self._factor(factor, tuple((x, x) for x in point))) * M
         return self._last * M
 
     def _jet(self, letter: Letter, box: Box, along: int) -> tuple[arb_mat, arb_mat, arb_mat]:
         """The map over a box, and its first two derivatives along a parameter."""
         M = self._first
         d = dd = arb_mat(M.nrows(), M.ncols())
-        for factor in letter.product:
-            F = self._factor(factor, box)
+        for factor in self._joined(letter):
+            F = factor if isinstance(factor, arb_mat) else self._factor(factor, box)
             M, d, dd = F * M, F * d, F * dd
-            slope = arb(0 if factor.times is None else factor.times[along + 1])
-            if slope != 0:
-                G = self._matrices[factor.matrix] * slope
+            if isinstance(factor, Factor) and factor.times is not None and factor.times[along + 1] != 0.0:
+                G = self._matrices[factor.matrix] * arb(factor.times[along + 1])
                 dd, d = dd + G * d * 2 + G * (G * M), d + G * M
         return self._last * M, self._last * d, self._last * dd
+
+    def _joined(self, letter: Letter) -> list[Factor | arb_mat]:
+        """The factors of a letter, those between two that vary as one matrix."""
+        if letter.product not in self._products:
+            found: list[Factor | arb_mat] = []
+            for factor in letter.product:
+                if factor.times is not None and any(factor.times[1:]):
+                    found.append(factor)
+                    continue
+                F = self._factor(factor, ((0.0, 0.0),) * len(letter.ranges))
+                if found and isinstance(found[-1], arb_mat):
+                    found[-1] = F * found[-1]
+                else:
+                    found.append(F)
+            self._products[letter.product] = found
+        return self._products[letter.product]
 
     def _factor(self, factor: Factor, box: Box) -> arb_mat:
         X = self._matrices[factor.matrix]

@@ -136,15 +136,18 @@ class TimingChain:
     def _empty_mode(self) -> Mode:
         return (), (False,) * len(self.links), ((0, None),) * len(self.links)
 
-    def repeating(self) -> list[Piece]:
-        """By cut, the piece from there to the next one, of a loop without chance whose messages in transit repeat."""
-        mode, before, pieces = self._empty_mode, None, list[Piece]()
+    def repeating(self, guess: Mode | None = None) -> tuple[list[Piece], Mode]:
+        """By cut, the piece from there to the next one, of a loop without chance whose messages in transit repeat.
+
+        And the mode at the first cut: the search begins at `guess`.
+        """
+        mode, before, pieces = guess or self._empty_mode, None, list[Piece]()
         while mode != before:
             before, pieces = mode, []
             for i in range(len(self.cuts)):
                 ((mode, _, piece),) = self.passages_from(i, mode)
                 pieces.append(piece)
-        return pieces
+        return pieces, mode
 
     def cut_time(self, k: int) -> int:
         """The time of the k-th cut, counted from 0."""

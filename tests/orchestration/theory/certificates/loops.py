@@ -97,6 +97,42 @@ def through_a_filter() -> CertifiedLoop:
     return CertifiedLoop(system=system, components=components, period=Fraction(10**9))
 
 
+def cascade(*, late: float = 0.0, wait: float = 0.0) -> CertifiedLoop:
+    """A double integrator under an outer law once a second, which is `late` and whose wish arrives after `wait`.
+
+    An inner law samples four times a second; its command arrives 0.1 s later.
+    """
+
+    def static(inputs: str, outputs: str, D: list[float]) -> SampledSystem:
+        nothing, one = np.zeros((0, 0)), np.zeros((1, 0))
+        return SampledSystem(
+            inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=np.zeros((0, len(D))), C=one, D=np.array([D])
+        )
+
+    plant = Continuous(
+        inputs=("u",), outputs=("p", "v"), A=np.array([[0.0, 1.0], [0.0, 0.0]]), B=np.array([[0.0], [1.0]]),
+        C=np.eye(2), D=np.zeros((2, 1)),
+    )  # fmt: skip
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.1),
+            "outer": Component(fmu="outer.fmu", sampling=Sampling(period=1.0, offset=late)),
+            "inner": Component(fmu="inner.fmu", sampling=Sampling(period=0.25)),
+        },
+        connections=(
+            Connection(name="position", start=("plant.p",), end=("outer.p",)),
+            Connection(name="wish", start=("outer.w",), end=("inner.w",), delay=wait),
+            Connection(name="speed", start=("plant.v",), end=("inner.v",)),
+            Connection(name="command", start=("inner.u",), end=("plant.u",), delay=0.1),
+        ),
+    )
+    components: Components = {
+        "plant": plant, "outer": static("p", "w", [-0.9]), "inner": static("wv", "u", [1.8, -1.8])
+    }  # fmt: skip
+    return CertifiedLoop(system=system, components=components, period=Fraction(10**9))
+
+
 def cart_under_lqg() -> CertifiedLoop:
     """A cart with a pendulum upright, at 10 ms under LQG of position and angle: in coordinates as measured, which are
     outputs at samples one after the other and nearly equal.

@@ -248,18 +248,6 @@ def test_two_components_that_are_late_are_refused() -> None:
         margin(changed(system, at_ease), "computers.node.tasks.slow.execution")
 
 
-def test_where_draws_change_the_order_of_events_they_are_named() -> None:
-    node = "computers.node.tasks"
-    own = {f"{node}.{name}.execution": 0.0005 for name in ("slow", "middle", "fast")}
-    certain = {f"{node}.middle.read": "release", f"{node}.middle.write": "deadline"}
-    with pytest.raises(UsageError) as refused:
-        margin(changed(example("three_servos"), own | certain), f"{node}.slow.execution")
-    draws = "samples of slow up to 1 ms late and messages of slow up to 1 ms late"
-    events = "'slow samples' is from 500 µs before to 500 µs after 'fast_command arrives'"
-    assert f"do not change the order of events; with {draws}, {events}; so it is at 0 s, too" in str(refused.value)
-    assert str(refused.value).endswith(f"no value has a proof: limit of {node}.slow.execution flies it")
-
-
 def test_a_path_of_something_else_is_refused() -> None:
     with pytest.raises(UsageError, match=r"computers\.NAME\.tasks\.NAME\.execution"):
         margin(on_a_computer(), "computers.node.tasks.logger.period")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 import math
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates.breaking import unstable_sequence
@@ -25,12 +27,13 @@ from orchestration.theory.certificates.certified_loop import (
     certified_loop,
 )
 from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.find_certificate import find_certificate
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.stability.loop_at_rest import at_rest
 from orchestration.theory.stability.period_map import growth_of_loop
 from tests.examples.common import native_example as example
 from tests.extent import sample
-from tests.orchestration.theory.certificates.loops import through_a_filter
+from tests.orchestration.theory.certificates.loops import cascade, through_a_filter
 
 PERIOD = 0.5
 COMMAND = Varying(kind=DELAY, name="command", path="connections.command.delay_jitter")
@@ -215,3 +218,55 @@ def test_a_law_that_integrates_over_its_step_is_refused_with_late_samples(system
     advice = r"expected connections\.command\.delay_jitter, limit of components\.controller\.sampling\.jitter, which"
     with pytest.raises(UsageError, match=f"samples of controller depend on the time to the next one.*{advice}"):
         LoopTimeline(dataclasses.replace(of, components=integrates), [SAMPLE])
+
+
+# -- two draws that change the order of events -------------------------------------------------------------------------
+
+OUTER = (Varying(kind=JITTER, name="outer", path="late"), Varying(kind=LATENCY, name="outer", path="wait"))
+
+
+@pytest.fixture(scope="module")
+def reordered() -> LoopFamily:
+    return LoopTimeline(cascade(), OUTER).family([0.3, 0.6], largest_sum=0.7)
+
+
+def true_map(family: LoopFamily, point: tuple[float, float]) -> Floats:
+    """The map of a letter with these draws that is the loop in which they are constant."""
+    constant = LoopTimeline(cascade(late=point[0], wait=point[1]), []).family()
+    period = functools.reduce(lambda total, x: constant.at(x) @ total, constant.letters, np.eye(len(constant.kept)))
+    within = [x for x in family.letters if all(a <= y <= b for y, (a, b) in zip(point, x.ranges))]
+    maps = [family.at(letter, point) for letter in within]
+    return next(M for M in maps if np.allclose(_traces(M), _traces(period), rtol=0.0, atol=1e-9))
+
+
+def _traces(M: Floats) -> list[float]:
+    """Of its powers, which do not depend on when the period begins."""
+    return [np.trace(np.linalg.matrix_power(M, k)) for k in (1, 2, 3)]
+
+
+def test_each_order_of_events_has_a_letter_that_is_the_loop_at_its_draws(reordered: LoopFamily) -> None:
+    """Where events are of one instant, too: a sample or arrival of the inner law, and both at once."""
+    drawn = [(x, y) for x, y in np.random.default_rng(5).uniform(0.0, [0.3, 0.6], (40, 2)).round(3) if x + y <= 0.7]
+    ties = itertools.product((0.0, 0.04, 0.1, 0.25, 0.3), (0.0, 0.1, 0.15, 0.21, 0.25, 0.4))
+    maps = [true_map(reordered, point) for point in (*drawn, *ties, (0.0, 0.5), (0.1, 0.6), (0.04, 0.46))]
+    random = np.random.default_rng(2)
+    for length in (1, 2, 3, 5, 8, 12):  # a proof follows
+        for _ in range(100):
+            product = functools.reduce(np.matmul, [maps[i] for i in random.integers(len(maps), size=length)])
+            assert np.abs(np.linalg.eigvals(product)).max() < 1.0
+
+
+def test_over_all_orders_a_proof_is_found_and_beyond_a_sequence_grows(reordered: LoopFamily) -> None:
+    assert find_certificate(reordered, ["here"]) is not None
+    wider = LoopTimeline(cascade(), OUTER).family([0.3, 0.7], largest_sum=0.8)
+    maps = [true_map(wider, point) for point in ((0.26, 0.41), (0.11, 0.69), (0.0, 0.0))]
+    assert np.abs(np.linalg.eigvals(functools.reduce(np.matmul, maps))).max() > 1.02
+    assert find_certificate(wider, ["here"]) is None
+
+
+def test_events_that_commute_may_change_places_in_one_letter(reordered: LoopFamily) -> None:
+    """A wish that arrives at the inner law changes nothing at once: only at its next sample."""
+    orders = {tuple(factor.matrix for factor in letter.product if factor.times is None) for letter in reordered.letters}
+    assert len(orders) < len(reordered.letters)
+    counts = {order: sum(event.startswith("outer samples") for event in order) for order in orders}
+    assert set(counts.values()) == {1}
