@@ -1,7 +1,10 @@
 """Slaves written out as C: the flight of them, and what it has in common with that of the same slaves in Python."""
 
 import hashlib
+import os
+import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +35,20 @@ def native(**fields: Any) -> Scenario:
 def kept(*what: str) -> Path:
     """The folder of what is built for tests alone, shared by all processes and kept for later runs."""
     return KEPT / hashlib.sha256(repr(what).encode()).hexdigest()[:16]
+
+
+def library(compiler: str, source: Path, *flags: str) -> bytes:
+    """One source in C as a shared library, kept for all processes and later runs while what makes it is the same."""
+    by = Path(compiler).resolve()
+    path = kept("library", f"{by} {by.stat().st_mtime_ns}", source.read_text(encoding="utf-8"), *flags) / "library"
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            made = Path(folder) / path.name
+            options = ("-shared", "-fPIC", "-O1", "-w")
+            subprocess.run([compiler, *options, *flags, str(source), "-o", str(made), "-lm"], check=True)
+            os.replace(made, path)  # of several processes each makes the same
+    return path.read_bytes()
 
 
 def natives(targets: Iterable[Target], mathematics: Mathematics, folder: Path | None = None) -> dict[str, Path]:

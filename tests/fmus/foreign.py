@@ -2,13 +2,13 @@
 
 import re
 import shutil
-import subprocess
 from pathlib import Path
 
 import fmpy
 import pytest
 
 from tests.fmus.damage import DESCRIPTION, write_fmu
+from tests.native import library
 
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
@@ -34,14 +34,11 @@ DESCRIBED = """<?xml version="1.0" encoding="UTF-8"?>
 
 def lag(path: Path, *macros: str, described: dict[str, str] | None = None) -> Path:
     """The FMU at `path`, compiled with `macros`, texts of its description replaced."""
-    library = path.with_suffix(fmpy.sharedLibraryExtension)
-    flags = ["-shared", "-fPIC", "-O1", "-w", *(f"-D{macro}" for macro in macros)]
-    subprocess.run([str(COMPILER), *flags, str(_SOURCE), "-o", str(library)], check=True)
+    binary = library(str(COMPILER), _SOURCE, *(f"-D{macro}" for macro in macros))
     text = DESCRIBED
     for old, new in (described or {}).items():
         text, count = re.subn(re.escape(old), lambda _, new=new: new, text)  # type: ignore[misc]
         assert count, f"{old}: not in the description"
-    files = {DESCRIPTION: text.encode(), f"binaries/{fmpy.platform}/Lag{library.suffix}": library.read_bytes()}
+    files = {DESCRIPTION: text.encode(), f"binaries/{fmpy.platform}/Lag{fmpy.sharedLibraryExtension}": binary}
     write_fmu(path, files)
-    library.unlink()
     return path

@@ -1,13 +1,11 @@
 """FMUs for model exchange and in event mode, all of one C source, compiled once where the tests run."""
 
-import functools
-import subprocess
-import tempfile
 import zipfile
 from pathlib import Path
 
 import fmpy
 
+from tests.native import library
 from tests.orchestration.components.fmi.small import COMPILER
 
 _SOURCE = Path(__file__).with_name("exchange.c")
@@ -82,10 +80,5 @@ def _with_clocks(folder: Path, name: str, description: str) -> Path:
     return path
 
 
-@functools.cache
 def _library() -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder) / "exchange"
-        options = ("-shared", "-fPIC", "-O1", "-w")
-        subprocess.run([str(COMPILER), *options, str(_SOURCE), "-o", str(library), "-lm"], check=True)
-        return library.read_bytes()
+    return library(str(COMPILER), _SOURCE)

@@ -1,9 +1,6 @@
 """FMUs of one C source with one habit each, compiled where the tests run, their descriptions written to fit."""
 
-import functools
 import shutil
-import subprocess
-import tempfile
 import uuid
 import zipfile
 from pathlib import Path
@@ -14,6 +11,7 @@ import pytest
 
 from fmu_kit.archive import SOURCE_HASH_FILE
 from orchestration.components.fmi import opening
+from tests.native import library
 
 COMPILER = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
@@ -64,7 +62,7 @@ def small(
     `mode_is_input`: that of FMI 2.0 has `mode` as an Integer that others may feed, of any value.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    library = _compiled(*habits, *(["FMI3"] if fmi == 3 else [])).replace(_KEPT, uuid.uuid4().hex.encode())
+    binary = _compiled(*habits, *(["FMI3"] if fmi == 3 else [])).replace(_KEPT, uuid.uuid4().hex.encode())
     state = (
         ("canGetAndSetFMUState", "canSerializeFMUState")
         if fmi == 3
@@ -88,7 +86,7 @@ def small(
         archive.writestr("modelDescription.xml", described)
         if forged:
             archive.writestr(SOURCE_HASH_FILE, "0" * 64)
-        archive.writestr(f"binaries/{place}/Small{fmpy.sharedLibraryExtension}", library)
+        archive.writestr(f"binaries/{place}/Small{fmpy.sharedLibraryExtension}", binary)
     return path
 
 
@@ -98,14 +96,8 @@ def known(fmu: Path) -> Path:
     return fmu
 
 
-@functools.cache
 def _compiled(*macros: str) -> bytes:
     """The library, in which what is kept has a name that each FMU replaces by its own."""
-    defined = [f"-D{macro}" for macro in (*macros, f'KEPT="{_KEPT.decode()}"')]
-    with tempfile.TemporaryDirectory() as folder:
-        library = Path(folder) / "small"
-        options = ("-shared", "-fPIC", "-O1", "-w")
-        subprocess.run([str(COMPILER), *options, *defined, str(_SOURCE), "-o", str(library), "-lm"], check=True)
-        content = library.read_bytes()
+    content = library(str(COMPILER), _SOURCE, *(f"-D{macro}" for macro in (*macros, f'KEPT="{_KEPT.decode()}"')))
     assert _KEPT in content
     return content

@@ -1,6 +1,5 @@
 """FMUs of FMI 1.0 for co-simulation, by one that is compiled here: exact rows, and what they cannot do by name."""
 
-import subprocess
 import zipfile
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from orchestration.components.fmi.opening import open_here
 from orchestration.components.fmi.read_description import read_model
 from orchestration.foundation.basics.errors import SimulatorError
 from quadcosim import UsageError, run
+from tests import native
 from tests.commands import Main
 from tests.orchestration.components.fmi.small import COMPILER, known, needs_compiler, small
 
@@ -42,11 +42,8 @@ _RUN = ("run", "system.toml", "--in-process")
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    path = tmp_path_factory.mktemp("old") / "old"
-    source = Path(__file__).with_name("fmi1.c")
-    subprocess.run([str(COMPILER), "-shared", "-fPIC", "-O1", str(source), "-o", str(path)], check=True)
-    return path.read_bytes()
+def library() -> bytes:
+    return native.library(str(COMPILER), Path(__file__).with_name("fmi1.c"))
 
 
 @pytest.fixture

@@ -54,7 +54,8 @@ def test_five_commands_lead_to_the_limit_plot_of_ones_own_controller(here: Path,
     assert "quadcosim authors" not in page
     assert main("run", "hover_pd/system.toml", "--native").stdout.startswith("good: final_distance")
     period = ("--of", "components.controller.sampling.period", "--from", "0.1", "--to", "0.2", "--scan", "0.1")
-    found = main("limit", "hover_pd/system.toml", "--native", *period, "--tolerance", "0.1").stdout
+    few_steps = ("--tolerance", "0.1", "--set", "components.plant.step=0.05")
+    found = main("limit", "hover_pd/system.toml", "--native", *period, *few_steps).stdout
     assert "large_signal_limit  100 ms" in found
     assert "local_limit         111." in found
     drawn = here / "hover_pd" / "limit_components_controller_sampling_period.png"

@@ -53,10 +53,10 @@ def test_the_tuned_gains_have_the_lowest_cost_by_matrices_and_another_search(tmp
     found = tuned(tuning(evaluations=30), tmp_path)
     (one,) = found.searches
     K, Td = (one.values[f"{GAINS}.{name}"] for name in ("K", "Td"))
-    least = minimize(lambda x: cost(*x), (1.5, 0.035), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9})
+    least = minimize(lambda x: cost(*x), (1.5, 0.035), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-7})
     assert one.cost == pytest.approx(cost(K, Td), rel=1e-9)
     assert one.cost == pytest.approx(least.fun, rel=1e-3)
-    assert one.cost >= least.fun * (1.0 - 1e-9)
+    assert one.cost >= least.fun * (1.0 - 1e-6)
     (path,) = found.written
     gains = read_toml(path, "gains")["components"]["controller"]["parameters"]
     assert gains == {"K": pytest.approx(K, rel=1e-5), "Td": pytest.approx(Td, rel=1e-5)}

@@ -1,11 +1,11 @@
 """The FMU of moving.c, compiled where the tests run: it has the inputs and outputs of random systems."""
 
-import subprocess
 import zipfile
 from pathlib import Path
 
 import fmpy
 
+from tests.native import library
 from tests.orchestration.components.fmi.small import COMPILER
 
 _PARAMETERS = {
@@ -23,9 +23,7 @@ _VARIABLE = '<ScalarVariable name="{}" valueReference="{}" causality="{}" variab
 def moving(folder: Path, *, fixed_step: bool = False) -> Path:
     """The FMU in `folder`, which has code for SIMD lanes too; it declares whether it takes steps of one length only."""
     folder.mkdir(exist_ok=True)
-    library = folder / f"Moving{fmpy.sharedLibraryExtension}"
-    source = Path(__file__).with_name("moving.c")
-    subprocess.run([str(COMPILER), "-shared", "-fPIC", "-O1", "-w", str(source), "-o", str(library), "-lm"], check=True)
+    binary = library(str(COMPILER), Path(__file__).with_name("moving.c"))
     inputs = [f"u{i}{output}" for i in range(16) for output in "yz"]
     variables = [_VARIABLE.format(name, i, "input", "continuous", 'start="0"') for i, name in enumerate(inputs)]
     variables += [_VARIABLE.format(name, 32 + i, "output", "continuous", "") for i, name in enumerate("yz")]
@@ -43,6 +41,6 @@ def moving(folder: Path, *, fixed_step: bool = False) -> Path:
     path = folder / "moving.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
-        archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
+        archive.writestr(f"binaries/{fmpy.platform}/Moving{fmpy.sharedLibraryExtension}", binary)
         archive.write(Path(__file__).with_name("moving_lanes.c"), "sources/lanes.c")
     return path
