@@ -145,7 +145,7 @@ def test_an_interrupted_tuning_continues(tuning, tmp_path):
     def run(systems):
         nonlocal count
         count += len(systems)
-        if count > 400:
+        if count > 200:
             raise KeyboardInterrupt
         return bowl(systems)
 
