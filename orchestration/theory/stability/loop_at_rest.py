@@ -469,8 +469,8 @@ def _expect_period(system: System) -> Fraction:
     period = common_period(system, LONGEST_HYPERPERIOD)
     if period is None:
         raise UsageError(
-            "the sampled components have no hyperperiod within twenty of the longest period: expected periods in "
-            "ratios of small whole numbers"
+            "the sampled components have no hyperperiod of at most twenty times the longest period: expected periods "
+            "in ratios of small whole numbers"
         )
     return period
 

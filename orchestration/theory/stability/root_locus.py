@@ -150,7 +150,8 @@ class RootLocus:
         if self.without:
             known += f"; no poles at {len(self.without)} of {self.tried} values tried, as {self.without[0]}"
         if self.asked is not None:
-            known += f"; {self.tried} values tried, at which all rates repeat together within twenty of the longest"
+            known += f"; {self.tried} values tried, at which all rates repeat together"
+            known += " after twenty times the longest period at most"
             known += f": {self.moved} of {self.asked} are moved to {len(self.values)}" if self.moved else ""
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
@@ -206,10 +207,10 @@ def locus(
     the only sampled component. By default the range is the first fifth of that of `limit`: periods from half to ten
     times that of the file, delays up to ten periods or twice that of the file. Values are `count`, default 40, evenly
     spaced, over more than a decade by equal factors, and the file's own. A period beside others has poles where all
-    rates repeat together within twenty of the longest: another value is moved to the multiple of most others within
-    half of the way to the next, else to the nearest, and crossings are between two such. Holds and delays are included;
-    jitter, loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is not seen,
-    but for jumps of a delay to a sampled component: both sides of each are tried.
+    rates repeat together after twenty times the longest at most: another value is moved to the multiple of most others
+    within half of the way to the next, else to the nearest, and crossings are between two such. Holds and delays are
+    included; jitter, loss, noise and quantisation are left out. A pair of crossings between two neighbouring values is
+    not seen, but for jumps of a delay to a sampled component: both sides of each are tried.
 
     Raises `UsageError` for an invalid quantity or range, and as `linearise` where no value has poles.
     """

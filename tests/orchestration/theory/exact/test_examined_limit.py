@@ -1,10 +1,19 @@
 """Local limits by radii at values that can be examined."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.theory.exact.examined_limit import by_examined
+from orchestration.simulation.requests.ranges import Varied
+from orchestration.systems.system.computers import Computer, Task
+from orchestration.systems.system.files import files_of
+from orchestration.theory.exact import mean_square
+from orchestration.theory.exact.examined_limit import METHOD, by_examined, local_limits
+from tests.examples.common import native_example as example
 
 SPAN = Range(first=0.002, step=0.001, last=0.01, tolerance=1e-4)
 
@@ -53,3 +62,43 @@ def test_before_a_value_that_is_stable_by_itself_the_first_that_can_be_examined_
     found = by_examined(radius, Range(**{**vars(SPAN), "tolerance": 2e-5, "own": 0.005, "also": (0.00775,)}))
     assert found is not None
     assert found.limit == pytest.approx(0.007705, abs=5e-6)
+
+
+def test_a_mean_square_limit_goes_on_beside_values_that_cannot_be_examined(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mean_square, "changed", lambda system, values: values["period"])
+    loops: Any = SimpleNamespace(radius=lambda value, *, agree: radius(value))
+    system: Any = SimpleNamespace(uses_scheduler=True)
+    span = Range(**{**vars(SPAN), "own": 0.005, "also": (0.007391,)})
+    found = mean_square._crossing(system, ["period"], span, loops)
+    assert found.limit == pytest.approx(0.007705, abs=1e-5)
+    assert found.lower is None
+    assert found.reason.startswith("second moments are bounded at 7.7 ms and grow without bound at 7.71 ms, of values")
+    assert "not examined: 7.391 ms" in found.reason
+
+
+GAIN, EXECUTION = 3.0 - 3.0**0.5, 0.2
+LIMIT = 2.0 / GAIN + 2.0 * EXECUTION
+"""Period [s] from which on small deviations grow, of x⁺ = x - (h - τ) K x - τ K x⁻, which oscillates there"""
+
+
+def test_limits_of_a_task_period_are_those_of_theory_where_schedules_repeat_late() -> None:
+    whole = example("minimum_variance")
+    controller = replace(whole.components["controller"], sampling=None)
+    control = Task(component="controller", period=1.0, priority=1, execution=EXECUTION)
+    beside = Task(period=0.3, priority=2, execution=0.001)
+    node = Computer(preemptive=True, tasks={"control": control, "beside": beside})
+    system = replace(
+        whole,
+        components={**whole.components, "controller": controller},
+        computers={"node": node},
+        operating_point={"components.controller.parameters.gain": GAIN},
+    )
+    varied, models = (
+        Varied(request=system, of="computers.node.tasks.control.period"),
+        files_of(system).models_of(system),
+    )
+    span = Range(own=1.0, first=1.0, step=0.5, last=2.5, tolerance=0.1)
+    found = local_limits(varied, span, models)
+    assert found.limit is not None
+    assert (found.method or "").startswith(METHOD)
+    assert found.limit == pytest.approx(LIMIT, abs=found.accuracy or 0.0)

@@ -159,7 +159,7 @@ def test_a_source_that_changes_before_the_loop_rests_is_named(instances: Instanc
 def test_sampled_components_without_a_common_hyperperiod_are_refused(system: System, instances: Instances) -> None:
     other = changed(system, {PERIOD: 0.0512341}).components["controller"]
     chosen = dataclasses.replace(system, components={**system.components, "other": other})
-    with pytest.raises(UsageError, match="have no hyperperiod within twenty of the longest period"):
+    with pytest.raises(UsageError, match="have no hyperperiod of at most twenty times the longest period"):
         growth_of_loop(chosen, instances)
 
 
