@@ -71,8 +71,8 @@ from orchestration.theory.certificates.region import Region as Region
 from orchestration.theory.certificates.region import margin_region as margin_region
 from orchestration.theory.exact.expect import Expected as Expected
 from orchestration.theory.exact.expect import expect as expect
-from orchestration.theory.stability.closed_loop_step import StepResponse as StepResponse
-from orchestration.theory.stability.closed_loop_step import step_response as step_response
+from orchestration.theory.stability.step_response import StepResponse as StepResponse
+from orchestration.theory.stability.step_response import step_response as step_response
 from orchestration.theory.stability.frequency import Bode as Bode
 from orchestration.theory.stability.frequency import bode as bode
 from orchestration.theory.stability.linearise import Linearised as Linearised
@@ -82,5 +82,5 @@ from orchestration.theory.stability.plant_at_start import plant_at_start as plan
 from orchestration.theory.stability.root_locus import RootLocus as RootLocus
 from orchestration.theory.stability.root_locus import locus as locus
 from orchestration.theory.stability.state_space import StateSpace as StateSpace
-from orchestration.theory.stability.step_response import Step as Step
-from orchestration.theory.stability.step_response import step as step
+from orchestration.theory.stability.step import Step as Step
+from orchestration.theory.stability.step import step as step

@@ -92,7 +92,7 @@ def step(
     Without --to and --of: how each command's loop takes back a step that is added to the command.
     """
     from orchestration.systems.system.connection import component_of
-    from orchestration.theory.stability.step_response import step as response_of
+    from orchestration.theory.stability.step import step as response_of
 
     if to is not None or of is not None:
         if to is None or of is None or component is not None:
@@ -119,7 +119,7 @@ def step(
 
 
 def _closed_loop_step(request: "Request", to: str, of: str, out: Path | None) -> CommandResult:
-    from orchestration.theory.stability.closed_loop_step import step_response
+    from orchestration.theory.stability.step_response import step_response
 
     found = step_response(request, to=to, of=of)
     if out is not None:

@@ -19,10 +19,10 @@ from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES,
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal, unit
 from orchestration.simulation.results.quantities import Quantity, setting
-from orchestration.theory.stability.closed_loop_step import StepResponse
 from orchestration.theory.stability.frequency import Bode, LoopMargins, critical_phase
 from orchestration.theory.stability.root_locus import RootLocus
-from orchestration.theory.stability.step_response import Step
+from orchestration.theory.stability.step import Step
+from orchestration.theory.stability.step_response import StepResponse
 
 SHOWN = 1.4
 """Largest part of a pole that is drawn"""
