@@ -67,12 +67,13 @@ def limit(
     look: FigureFlags,
 ) -> CommandResult:
     """Find the largest good value of a period, delay, jitter, loss or any path by runs, and the local limit."""
-    from orchestration.experiments.limits import limit as limits
+    from orchestration.experiments.limits import limit_result
+    from orchestration.experiments.limits.limit import limit as limit_of
     from orchestration.simulation.engines.master import engine_named
 
     how = "auto" if engine == "auto" else engine_named(engine, "auto")
     request = request_from(scenario, flags, timing)
-    found = limits.limit(
+    found = limit_of(
         request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
         continuous=continuous, workers=workers, engine=how or "auto",
     )  # fmt: skip
@@ -82,9 +83,9 @@ def limit(
 
         for written in draw_limit(request, found, where, look.figure_style):
             inform(str(written))
-    texts = limits.as_text(found)
+    texts = limit_result.as_text(found)
     lines = [*in_columns([*texts.items()])]
-    if shares := limits.shares_as_text(found):
+    if shares := limit_result.shares_as_text(found):
         lines += ["", *in_columns(shares)]
     lines += [f"note: {text}" for text in found.notes]
     return CommandResult(document=found, verdict=found.verdict, lines=lines)

@@ -66,6 +66,12 @@ class Evaluator:
     _done: int = 0
     _remaining: int = 0
 
+    @property
+    def scheduled(self) -> list[float]:
+        """The evaluated values, in rising order, of a system with computers or networks; else none."""
+        system = self.varied.system
+        return sorted(self.tried) if system.computers or system.networks else []
+
     def expect_remaining(self, count: int) -> None:
         """Set how many values may follow the next one, for the progress as a share of all of them."""
         self._remaining = count

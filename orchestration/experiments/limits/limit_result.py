@@ -170,3 +170,50 @@ class Limit:
         import pandas as pd
 
         return pd.DataFrame([vars(one) for one in self.tried])
+
+
+_ALWAYS = ("local_limit", "large_signal_limit")
+"""Fields that are shown also where they have no value"""
+_IN_ITS_UNIT = (
+    *_ALWAYS, "local_limit_outside", "local_accuracy", "local_lower_limit", "mean_square_limit",
+    "large_signal_lower_limit", "refuted_limit", "missed_deadlines_from",
+)  # fmt: skip
+"""Fields in the unit of the quantity"""
+_HIDDEN = ("unit", "judged_unit", "geometric", "notes")
+
+
+def as_text(limit: Limit) -> dict[str, str]:
+    """The applicable fields of a limit as text; of the evaluated values their number."""
+    units = {**dict.fromkeys(_IN_ITS_UNIT, limit.unit), "judged_bound": limit.judged_unit, "horizon": "s"}
+    known = {name: value for name, value in vars(limit).items() if value not in (None, "", ())}
+    texts = dict.fromkeys((name for name in vars(limit) if name in (*known, *_ALWAYS) and name not in _HIDDEN), "-")
+    for name in texts.keys() & known.keys():
+        value = known[name]
+        texts[name] = quantity(value, units.get(name), DIGITS) if isinstance(value, float) else str(value)
+    texts |= dict(zip(("scan", "tolerance"), limit.resolution))
+    if limit.flies_above:
+        texts["flies_above"] = ", ".join(quantity(value, limit.unit, DIGITS) for value in limit.flies_above)
+    if limit.missed_by:
+        texts["missed_by"] = ", ".join(limit.missed_by)
+    if (ideal := limit.continuous) is not None:
+        settles = "" if ideal.settling_time is None else f", within 5 cm from {ideal.settling_time:.6g} s on"
+        texts["continuous"] = f"{ideal.outcome} at a period of {quantity(ideal.period, 's')}{settles}"
+    texts["tried"] = f"{len(limit.tried)} values"
+    return texts
+
+
+def shares_as_text(limit: Limit) -> list[list[str]]:
+    """A table of the evaluated values with their good seeds, and the share with its interval where all were run.
+
+    Empty where nothing is random.
+    """
+    if limit.confidence is None:
+        return []
+    rows = []
+    for one in limit.tried:
+        good, share = f"{one.flew} of the first {one.runs}", "-"
+        if one.share is not None:
+            low, high = one.share
+            good, share = f"{one.flew}", f"{one.flew / one.runs:.2f} [{low:.2f}, {high:.2f}]"
+        rows.append([quantity(one.value, limit.unit, DIGITS), good, share])
+    return [[limit.of, f"good of {limit.seeds}", f"share [{100.0 * limit.confidence:g} % Wilson interval]"], *rows]

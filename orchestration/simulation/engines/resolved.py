@@ -324,15 +324,8 @@ def unbelieved_periods(system: System, models: Mapping[str, Model]) -> dict[str,
     }
 
 
-def periods_in_words(system: System, models: Mapping[str, Model], other: System | None = None) -> list[str]:
-    """A warning for each such component; of a range of systems, to an `other` one, for those whose period stays, and
-    for those whose period varies what it means.
-    """
-    if other is not None:
-        fixed = unbelieved_periods(other, models)
-        found = unbelieved_periods(system, models)
-        each = zip(found, periods_in_words(system, models), other_periods_in_words(system, models))
-        return [stays if fixed.get(name) == found[name] else varies for name, stays, varies in each]
+def periods_in_words(system: System, models: Mapping[str, Model]) -> list[str]:
+    """A warning for each such component."""
     return [
         f"{name} ({models[name].name}): is sampled every {period:g} s, but its code believes {believed:g} s: what it "
         f"computes of time is wrong by a factor of {max(period / believed, believed / period):.6g}"
@@ -349,7 +342,17 @@ def other_periods_in_words(system: System, models: Mapping[str, Model]) -> list[
     ]
 
 
-def kept_periods_in_words(base: System, varied: System, models: Mapping[str, Model]) -> list[str]:
+def varied_periods_in_words(base: System, first: System, last: System, models: Mapping[str, Model]) -> list[str]:
+    """Of a range of systems from `first` to `last` around `base`: a warning for each such component whose period stays,
+    what it means for those whose period varies, and which components keep the period of the file as a parameter.
+    """
+    fixed, found = unbelieved_periods(first, models), unbelieved_periods(last, models)
+    each = zip(found, periods_in_words(last, models), other_periods_in_words(last, models))
+    believed = [stays if fixed.get(name) == found[name] else varies for name, stays, varies in each]
+    return believed + _kept_periods_in_words(base, last, models)
+
+
+def _kept_periods_in_words(base: System, varied: System, models: Mapping[str, Model]) -> list[str]:
     """What runs over periods mean for each component with a parameter `period` that is a number, that of its samples in
     the file, where another sampling period is varied.
     """

@@ -67,16 +67,20 @@ def rested(request: Request, *, checked: bool = True) -> System:
 
 
 @contextmanager
-def warned_of_timing(system: System, files: Files, other: System | None = None) -> Iterator[None]:
-    """Warn, as a run does, of components whose code believes another period than theirs; `other` as there.
+def warned_of_timing(system: System, files: Files, ends: tuple[System, System] | None = None) -> Iterator[None]:
+    """Warn, as a run does, of components whose code believes another period than theirs; of a range, by its two ends.
 
     Of overloaded processors where the block finds an answer: where it does not, its error names them.
     """
-    from orchestration.simulation.engines.resolved import periods_in_words  # not before: loads the engines
+    from orchestration.simulation.engines.resolved import (  # not before: loads the engines
+        periods_in_words,
+        varied_periods_in_words,
+    )
     from orchestration.systems.schedule.overload import overloads_in_words
 
-    for text in periods_in_words(system, files.models_of(system), other):
+    models = files.models_of(system)
+    for text in varied_periods_in_words(system, *ends, models) if ends else periods_in_words(system, models):
         warn(text)
     yield
-    for text in overloads_in_words([system] if other is None else [system, other]):
+    for text in overloads_in_words(ends or (system,)):
         warn(text)

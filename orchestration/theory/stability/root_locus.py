@@ -223,7 +223,8 @@ def locus(
         varied, files.models_of(varied.system), first=first, last=last, tolerance=None, scan=None, share=SHARE
     )
     inform_of_chance(varied.system)
-    with warned_of_timing(varied.at(span.last), files, varied.at(span.values()[0])):
+    ends = varied.at(span.values()[0]), varied.at(span.last)
+    with warned_of_timing(varied.system, files, ends):
         return isolated_call(files.fmus.values(), _root_locus, varied, span, count)
 
 

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 import quadcosim
 from orchestration.components.fmi.reuse import Instances
 from orchestration.experiments.limits import limit as limits
+from orchestration.experiments.limits import notes
 from orchestration.experiments.limits.evaluation import is_good
-from orchestration.experiments.limits.limit import as_text, shares_as_text
-from orchestration.experiments.limits.limit_result import ContinuousRun
+from orchestration.experiments.limits.limit_result import ContinuousRun, as_text, shares_as_text
 from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good, first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
@@ -599,17 +599,17 @@ def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
     span = Range(first=0.001, step=0.0015, last=0.004, tolerance=1e-5)
     assert limits._missed_from(varied, span, [0.001, 0.002]) is None  # 100 % busy, and in time
     assert limits._missed_from(varied, span, [0.001, 0.0025, 0.003]) == pytest.approx(0.002 + 0.5e-5, abs=0.5e-5)
-    late = limits._where_missed(0.002, LinearLimit(limit=0.003), span)
+    late = notes._where_missed(0.002, LinearLimit(limit=0.003), span)
     assert late[0].startswith("where deadlines are missed, from 2 ms on, stability need not be an interval")
-    assert limits._where_missed(0.004, LinearLimit(limit=0.003), span) == []
-    assert limits._overloaded(varied, span, [0.001, 0.002]) == []
-    (note,) = limits._overloaded(varied, span, [0.001, 0.0025, 0.003])
+    assert notes._where_missed(0.004, LinearLimit(limit=0.003), span) == []
+    assert notes._overloaded(varied, span, [0.001, 0.002]) == []
+    (note,) = notes._overloaded(varied, span, [0.001, 0.0025, 0.003])
     assert note.startswith(
         "at 2.5 ms to 3 ms: computers.cpu: overloaded, its tasks demand up to 125 % of its time: jobs of load wait"
     )
     varied = Varied(request=system, of="computers.cpu.tasks.fast.execution")
-    assert limits._starved(varied, span, [0.001, 0.0025]) == []  # late, and done
-    assert limits._starved(varied, span, [0.0025, 0.004, 0.005]) == [
+    assert notes._starved(varied, span, [0.001, 0.0025]) == []  # late, and done
+    assert notes._starved(varied, span, [0.0025, 0.004, 0.005]) == [
         "at 4 ms cpu.load is never done: small deviations are of the loop without it"
     ]
 

@@ -10,7 +10,7 @@ import pytest
 from orchestration.components.fmi.read_description import Model, read_model
 from orchestration.foundation.basics.documents import tables_in
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.simulation.engines.resolved import kept_periods_in_words, other_periods_in_words
+from orchestration.simulation.engines.resolved import other_periods_in_words, varied_periods_in_words
 from orchestration.systems.system.check import check
 from orchestration.systems.system.component import OWN_PERIOD, Component, Sampling
 from orchestration.systems.system.computers import Computer, Task
@@ -87,13 +87,13 @@ def test_a_law_that_keeps_the_period_of_its_file_is_told_how_it_follows(tmp_path
     models = {"law": read_model(tmp_path / "Law.fmu")}
     law = dataclasses.replace(LAW, parameters={"period": 0.01})
     keeps = System(stop_time=1.0, components={"law": law})
-    assert kept_periods_in_words(keeps, changed(keeps, {CLOCK: 0.02}), models) == [
+    assert varied_periods_in_words(keeps, keeps, changed(keeps, {CLOCK: 0.02}), models) == [
         'law keeps its parameter period of 10 ms; with period = "sampling.period" under its parameters it follows'
     ]
     for other in (changed(keeps, {"stop_time": 2.0}), changed(keeps, {CLOCK: 0.02, FOLLOWS: 0.02})):
-        assert kept_periods_in_words(keeps, other, models) == []
+        assert varied_periods_in_words(keeps, keeps, other, models) == []
     follows = changed(keeps, {FOLLOWS: OWN_PERIOD})
-    assert kept_periods_in_words(follows, changed(follows, {CLOCK: 0.02}), models) == []
+    assert varied_periods_in_words(follows, follows, changed(follows, {CLOCK: 0.02}), models) == []
 
 
 def test_code_that_is_told_its_period_believes_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -189,6 +189,16 @@ def test_values_of_a_period_move_to_those_at_which_it_meets_the_others() -> None
     assert few == (0.0072, 0.00724)
 
 
+def test_a_locus_over_the_period_tells_that_a_law_keeps_its_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(root_locus, "isolated_call", lambda *given: None)
+    locus(example("dc_servo"), "components.controller.sampling.period", first=0.006, last=0.007, count=2)
+    assert "controller keeps its parameter period of 6 ms; with period = " in capsys.readouterr().err
+    locus(example("dc_servo"), DELAY, first=0.0, last=0.02, count=2)
+    assert "keeps" not in capsys.readouterr().err
+
+
 def test_a_locus_of_one_value_is_refused() -> None:
     with pytest.raises(UsageError, match="count = 1: expected a number from 2"):
         locus(example("dc_servo"), DELAY, first=0.0, last=0.02, count=1)
