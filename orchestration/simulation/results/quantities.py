@@ -32,8 +32,8 @@ class Quantity:
         return self.factor * np.asarray(values, float)
 
     def text_of(self, value: float, digits: int = 6) -> str:
-        """A stored value as text, in its unit and with it."""
-        return f"{self.factor * value:.{digits}g} {labels.unit(self.unit) or ''}".rstrip()
+        """A stored value as text, in its unit and with it, rounded as it is stored: to the digits of other texts."""
+        return f"{self.factor * float(f'{value:.{digits}g}'):.{digits}g} {labels.unit(self.unit) or ''}".rstrip()
 
 
 def quantity(name: str, unit: str | None, values: Iterable[Any]) -> Quantity:

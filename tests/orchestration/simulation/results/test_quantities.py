@@ -2,6 +2,7 @@
 
 import pytest
 
+from orchestration.foundation.basics.unit_algebra import quantity as text_of
 from orchestration.simulation.results.quantities import is_in_seconds, quantity, setting
 
 
@@ -59,3 +60,7 @@ def test_what_a_parameter_is_in_its_fmu_says() -> None:
     assert not is_in_seconds("components.pilot.parameters.delay")
     assert not is_in_seconds("plant.delay")
     assert is_in_seconds("components.plant.step")
+
+
+def test_a_value_between_two_roundings_is_the_same_in_figures_and_sentences() -> None:
+    assert quantity("period", "s", [0.005278245]).text_of(0.005278245) == text_of(0.005278245, "s", 6)
