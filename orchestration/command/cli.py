@@ -175,7 +175,7 @@ def _usage_message(error: Exception) -> str | None:
         if problem["type"] in ("float_parsing", "int_parsing"):
             kind = "a number" if problem["type"] == "float_parsing" else "a whole number"
             given = f"{error.param.opts[0]} {problem['input']}"  # type: ignore[attr-defined]
-            return f"{given}: expected {kind}{without_unit(problem['input'])}"
+            return f"{given}: expected {without_unit(kind, problem['input'])}"
     flag, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
     if not (flag and known):
         return str(describe())

@@ -14,7 +14,7 @@ from orchestration.command.options import option
 from orchestration.command.registry import Command, build_option, option_group
 from orchestration.foundation.basics.attribute_docs import FieldDoc, attribute_docs
 from orchestration.foundation.basics.documents import toml_of
-from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.errors import UsageError, without_unit
 from orchestration.systems.system.choices import Clock, Hold, Order, Spread
 
 if TYPE_CHECKING:
@@ -275,7 +275,7 @@ def _number(place: str, text: str, expected: str = "a number") -> float:
     try:
         return float(text)
     except ValueError:
-        raise UsageError(f"{place} {text}: expected {expected}") from None
+        raise UsageError(f"{place} {text}: expected {without_unit(expected, text)}") from None
 
 
 def _value(text: str) -> Any:

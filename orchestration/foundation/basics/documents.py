@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePath
 from typing import Any
 
-from orchestration.foundation.basics.errors import WHOLE_NUMBER, UsageError, shown
+from orchestration.foundation.basics.errors import WHOLE_NUMBER, UsageError, shown, without_unit
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -76,13 +76,26 @@ def toml_of(text: str, path: str) -> dict[str, Any]:
     try:
         tables: dict[str, Any] = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path}: expected TOML: {error}") from error
+        raise UsageError(f"{path}: expected TOML: {error}{_of_unit_at(text, str(error))}") from error
     except ValueError as error:  # a number with more digits than Python converts
         raise UsageError(f"{path}: expected whole numbers of at most 64 bits") from error
     except RecursionError as error:
         raise UsageError(f"{path}: expected TOML nested at most {DEEPEST} deep") from error
     _expect_plain(tables, path)
     return tables
+
+
+_WITH_UNIT = re.compile(r"[+-]?[\d._]+(?:[eE][+-]?\d+)?\s*(?P<unit>[^\W\d]\w*)(?=\s*(?:[,\]}#]|$))")
+
+
+def _of_unit_at(text: str, problem: str) -> str:
+    """The end of a message on text that is not TOML: that a number has a unit, if it has one at that place."""
+    place = re.search(r"line (\d+), column (\d+)", problem)
+    if place is None:
+        return ""
+    line, column = text.split("\n")[int(place[1]) - 1].rstrip(), int(place[2]) - 1
+    there = (found[0] for found in _WITH_UNIT.finditer(line) if found.start("unit") == column)
+    return "".join(f"; {value}: expected {without_unit('a number', value)}" for value in there)
 
 
 def copied_tables(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -137,13 +137,17 @@ def shown(value: object) -> str:
     return text if len(text) <= 100 else f"{text[:99]}…"
 
 
-_WITH_UNIT = re.compile(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*[^\W\d].*")
+_WITH_UNIT = re.compile(r"'?[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*(?P<unit>[^\W\d][^']*)'?")
+_OF_TIME = re.compile(r"[munµμ]?s|m?secs?|(milli|micro|nano)?seconds?|min|minutes?|h|hours?|[kM]?Hz")
 
 
-def without_unit(value: object) -> str:
-    """The end of a message on what is no number: that it has a unit, if so."""
-    has_one = isinstance(value, str) and _WITH_UNIT.fullmatch(value)
-    return " without its unit; times are in seconds" if has_one else ""
+def without_unit(expected: str, value: object) -> str:
+    """What is `expected` in place of a value: of a number with a unit without it, and of a time in which one."""
+    found = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
+    if found is None:
+        return expected
+    text, count = re.subn(r"\bnumber\b", "number without its unit", expected, count=1)
+    return text + "; times are in seconds" if count and _OF_TIME.fullmatch(found["unit"]) else text
 
 
 def told_apart(value: float, bound: float, digits: int = 6) -> tuple[str, str]:

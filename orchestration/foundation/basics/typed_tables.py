@@ -286,5 +286,5 @@ def _first_problem(error: "pydantic.ValidationError", file: type, document: Mapp
         kinds = list(dict.fromkeys(text.removeprefix(_KIND) for text in here if text.startswith(_KIND)))
         message = _KIND + " or ".join([", ".join(kinds[:-1]), kinds[-1]] if kinds[1:] else kinds)
     message = message.replace("Input should be", "expected")
-    message = f"{message[:1].lower()}{message[1:]}" + (without_unit(value) if message.endswith("number") else "")
+    message = without_unit(f"{message[:1].lower()}{message[1:]}", value)
     return f"{place} = {shown(value if isinstance(value, float) else repr(value))}: {message}"

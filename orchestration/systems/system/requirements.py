@@ -22,8 +22,7 @@ def is_finite(value: object) -> TypeGuard[float]:
 def require(condition: bool, name: str, value: object, expected: str) -> None:
     """Require the condition; the error reports `name`, `value` and what is `expected`."""
     if not condition:
-        unit = without_unit(value) if expected.endswith("number") else ""
-        raise UsageError(f"{name} = {shown(value)}: expected {expected}{unit}")
+        raise UsageError(f"{name} = {shown(value)}: expected {without_unit(expected, value)}")
 
 
 def _quoted(value: object) -> object:

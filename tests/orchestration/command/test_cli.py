@@ -311,6 +311,8 @@ def test_a_run_paused_and_resumed_is_the_same_run(main: Main, here: Path) -> Non
         (["--jitter", "0.02"], "timing.jitter = 0.02: expected less than the period"),
         (["--delay", "late"], "--delay late: expected a number, or a table"),
         (["--period", "10ms"], "--period 10ms: expected a number without its unit; times are in seconds"),
+        (["--burst-length", "3 losses"], "--burst-length 3 losses: expected a number without its unit (see --help)"),
+        (["--delay", "1ms"], "--delay 1ms: expected a number without its unit, or a table of its distribution, as "),
         (["--delay", "{unifrm=[0,1]}"], "timing.delay.unifrm: no such key; expected one of uniform"),
         (["--loss", "2"], "timing.loss = 2.0: expected a probability"),
         (["--stop-time", "0"], "stop_time = 0.0: expected a positive number"),

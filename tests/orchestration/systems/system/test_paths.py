@@ -74,6 +74,13 @@ def test_the_execution_time_of_a_task_takes_a_distribution() -> None:
             "late",
             "connections.command.delay = late: expected zero or a positive number, or",
         ),
+        (
+            "connections.command.delay",
+            "1ms",
+            "connections.command.delay = 1ms: expected zero or a positive number without its unit, or a table that "
+            "says how it is distributed, as {uniform = [0.001, 0.004]}; times are in seconds",
+        ),
+        ("components.plant.step", "1ms", "components.plant.step = '1ms': expected a positive number without its unit;"),
         ("components.plant.step", "{uniform=[0,1]}", "components.plant.step = '{uniform=[0,1]}': expected a positive"),
     ],
 )
