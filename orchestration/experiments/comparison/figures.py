@@ -15,14 +15,15 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from orchestration.experiments.comparison.cells import CellSummary, Median
-from orchestration.experiments.comparison.fronts import Point
+from orchestration.experiments.comparison.fronts import Pair, Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.experiments.studies.axes import Value
+from orchestration.experiments.studies.cell_lines import HEIGHTS, draw_difference
 from orchestration.experiments.studies.cell_texts import HALF, OF_ALL, letters_of, write_counts
 from orchestration.foundation.basics.simulator import Floats, Integers
 from orchestration.simulation.figures import cells
 from orchestration.simulation.figures.lines import abreast, plain
-from orchestration.simulation.figures.palette import BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
+from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES, GREY, MARKS, ORANGE
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.quantities import Quantity
 
@@ -87,17 +88,28 @@ def _basin(panel: Axes, at: Floats, counts: Integers, letters: float) -> tuple[A
 
 
 def shares(
-    by_title: Mapping[str, Sequence[CellSummary]], axis: Quantity, colors: Mapping[str, str], style: Style = SCREEN
+    by_title: Mapping[str, Sequence[CellSummary]],
+    axis: Quantity,
+    colors: Mapping[str, str],
+    style: Style = SCREEN,
+    *,
+    pairs: Sequence[Pair] = (),
 ) -> Figure:
     """The shares that survive and settle, with Wilson intervals, two lines for each controller.
 
     Controllers differ by colour, dashes, marks and widths: of lines that coincide the lower ones are wider. In a single
     panel their names stand on the lines.
 
-    `by_title` has the cells of each panel; `colors` are those of the controllers.
+    `by_title` has the cells of each panel; `colors` are those of the controllers. The `pairs` of two controllers have
+    a panel below, with their differences.
     """
     several = len(by_title) > 1
-    figure, panels = _panels(len(by_title), 20.0 if several else 30.0, style)
+    if pairs:
+        figure = style.figure(46.0)
+        panels = figure.subplots(2, sharex=True, height_ratios=HEIGHTS)
+        _differences(panels[1], axis, pairs)
+    else:
+        figure, panels = _panels(len(by_title), 20.0 if several else 30.0, style)
     shown = {cell.controller for group in by_title.values() for cell in group}
     names = [name for name in colors if name in shown]
     widths = np.linspace(1.8, 1.0, len(names)) * style.line
@@ -128,8 +140,20 @@ def shares(
         figure.supylabel("share of the starts")
     else:
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-        panels[0].set(xlabel=axis.title, ylabel="share of the starts")
+        panels[0].set_ylabel("share of the starts")
+        panels[-1].set_xlabel(axis.title)
     return figure
+
+
+def _differences(panel: Axes, axis: Quantity, pairs: Sequence[Pair]) -> None:
+    """The shares of one controller minus those of another, with Newcombe's intervals."""
+    at = axis.of([pair.value for pair in pairs])
+    for (fate, look), color in zip(_LINES.items(), (BLACK, GREY)):
+        found = [pair.shares[fate] for pair in pairs]
+        middle, low, high = (np.array([getattr(one, key) for one in found]) for key in ("value", "low", "high"))
+        draw_difference(panel, at, middle, (low, high), **look, color=color)
+    panel.set_ylabel("difference")
+    panel.set_title(f"{pairs[0].controller} minus {pairs[0].against}, from the same starts", fontsize="small")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -86,7 +86,8 @@ def _of_one(
             if len(group := rows[rows[CONTROLLER] == name])
         }
         yield f"basin_{fate}_{end}", partial(basins, by_size, axis, fate, title)
-    yield f"shares_{end}", partial(shares, {title: summaries}, axis, colors)
+    two = [pair for pair in outcome.pairs if (pair.vehicle, pair.condition) == of] if len(colors) == 2 else []
+    yield f"shares_{end}", partial(shares, {title: summaries}, axis, colors, pairs=two)
     if points:
         values = [*dict.fromkeys(point.value for point in points)]
         shown = [values[round(i)] for i in np.linspace(0, len(values) - 1, min(len(values), MAX_PANELS))]

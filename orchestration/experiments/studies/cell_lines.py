@@ -143,7 +143,7 @@ def cell_lines(
         said += [left_out(shown, words[0]), remarked(shown)]
     if both is not None:
         found = differences_in(table, names, both, metric, average)
-        _draw_difference(panels[1, 0], across.of(found[axis.name]), found)
+        _draw_differences(panels[1, 0], across.of(found[axis.name]), found)
         unit = None if metric == GOOD else units.get(metric)
         panels[1, 0].set_ylabel(labels.metric_with_unit("difference", unit))
         minus, kind = names_of(both[1:]), "by Newcombe for pairs" if metric == GOOD else INTERVALS[average]
@@ -156,15 +156,20 @@ def cell_lines(
     return figure
 
 
-def _draw_difference(panel: Axes, at: Floats, found: "pd.DataFrame") -> None:
+def _draw_differences(panel: Axes, at: Floats, found: "pd.DataFrame") -> None:
     """The differences of two laws with their intervals; those without a finite expectation are at the upper edge."""
     infinite = found[REMARK].eq(NO_EXPECTATION) if REMARK in found else found["difference"].isna() & False
-    found = found.assign(difference=found["difference"].mask(infinite))
-    ends = np.abs(found[["low", "high"]].to_numpy().T - found["difference"].to_numpy())
-    panel.axhline(0.0, color=BLACK, linewidth=0.6)
-    panel.errorbar(at, found["difference"], ends, color=BLACK, marker="o", markersize=3.0, linewidth=0.8, capsize=2.5)
+    middle = found["difference"].mask(infinite).to_numpy()
+    draw_difference(panel, at, middle, (found["low"].to_numpy(), found["high"].to_numpy()))
     if infinite.any():
         mark_edge(panel, {BLACK: at[infinite]}, **INFINITY)
+
+
+def draw_difference(panel: Axes, at: Floats, middle: Floats, ends: tuple[Floats, Floats], **look: Any) -> None:
+    """A line of differences with the ends of their intervals, and one at 0."""
+    panel.axhline(0.0, color=BLACK, linewidth=0.6)
+    look = {"color": BLACK, "marker": "o", "markersize": 3.0, "linewidth": 0.8, **look}
+    panel.errorbar(at, middle, np.abs(np.subtract(ends, middle)), capsize=2.5, **look)
 
 
 def _write_rows(panel: Axes, numbers: Mapping[str, Sequence[tuple[float, str]]]) -> float:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from orchestration.experiments.comparison.cells import CellSummary, Median, Share
 from orchestration.experiments.comparison.figures import BINS, Reach, basins, colors_of, fronts_of, limits_of, shares
-from orchestration.experiments.comparison.fronts import Point
+from orchestration.experiments.comparison.fronts import Difference, Pair, Point
 from orchestration.experiments.comparison.limits import GridLimit
 from orchestration.simulation.figures.names import COLUMNS
 from orchestration.simulation.figures.style import SCREEN, STYLES, Style
@@ -44,6 +44,30 @@ def test_controllers_differ_by_dashes_and_are_named_on_their_lines_the_earlier_t
     assert 0.0 < places["soon"][0] < 1.0 < places["later"][0] < 2.0
     assert (places["never"][0], places["nor this"][0]) == (2.0, 2.0)
     assert 1.0 < places["never"][1] < places["nor this"][1] < panel.get_ylim()[1], "lines that coincide have two names"
+
+
+def test_two_controllers_have_the_differences_of_their_pairs_below_with_their_intervals() -> None:
+    names, none = ["soon", "never"], Median.of([])
+    cells = [cell for name in names for cell in cells_of(name, SURVIVORS[name])]
+    differences = [
+        {
+            "survive": Difference(value=0.1 * k, low=0.1 * k - 0.2, high=0.5),
+            "settle": Difference(value=0, low=0, high=0),
+        }
+        for k in range(3)
+    ]
+    pairs = [
+        Pair(
+            vehicle="v", condition="c", value=float(k), controller="never", against="soon", both=0, only_it=0,
+            only_other=0, neither=0, settles=0, error=none, effort=none, shares=each,
+        )
+        for k, each in enumerate(differences)
+    ]  # fmt: skip
+    below = shares({"": cells}, Quantity(name="axis"), colors_of(names), pairs=pairs).axes[1]
+    drawn, (bars,) = below.containers[0][0], below.containers[0][2]
+    assert np.asarray(drawn.get_xydata()).tolist() == [[k, 0.1 * k] for k in range(3)]
+    np.testing.assert_allclose([each[:, 1] for each in bars.get_segments()], [[0.1 * k - 0.2, 0.5] for k in range(3)])
+    assert below.get_title() == "never minus soon, from the same starts"
 
 
 def test_several_panels_have_their_controllers_in_one_legend() -> None:
