@@ -267,10 +267,8 @@ def _draw_radius(axes: Axes, result: RootLocus, across: Quantity) -> None:
     plain(axes.xaxis)
     ends = [across.of(one.ends) for one in result.crossings]
     places = [float(end.mean()) for end in ends]
-    labels = [
-        " to ".join([*(f"{x:.{one.digits}g}" for x in end[:-1]), across.text_of(one.ends[-1], one.digits)])
-        for one, end in zip(result.crossings, ends)
-    ]
+    shown = ([across.text_of(value, one.digits) for value in one.ends] for one in result.crossings)
+    labels = [" to ".join([*(text.split()[0] for text in each[:-1]), each[-1]]) for each in shown]
     rows, lefts = _rows_of(axes, places, labels)
     scale = axes.yaxis.get_transform()
     low, high = scale.transform([min(np.nanmin(radius), edge), max(np.nanmax(radius), edge)])
