@@ -73,7 +73,8 @@ from orchestration.theory.exact.expect import Expected as Expected
 from orchestration.theory.exact.expect import expect as expect
 from orchestration.theory.stability.step_response import StepResponse as StepResponse
 from orchestration.theory.stability.step_response import step_response as step_response
-from orchestration.theory.stability.frequency import Bode as Bode
+from orchestration.theory.stability.loop_margins import Bode as Bode
+from orchestration.theory.stability.loop_margins import Bodes as Bodes
 from orchestration.theory.stability.frequency import bode as bode
 from orchestration.theory.stability.linearise import Linearised as Linearised
 from orchestration.theory.stability.linearise import linearise as linearise

@@ -27,7 +27,10 @@ Folder = Annotated[Path | None, option("--out", "Folder for the figure.", "DIR")
 def bode(
     scenario: ScenarioFile = None,
     timing: Timing = None,
-    component: Cut = None,
+    component: Annotated[
+        str | None,
+        option("--component", "Whose loops are cut open; default: each that is sampled, the others closed.", "NAME"),
+    ] = None,
     out: Folder = None,
     *,
     flags: FlightFlags,
@@ -36,18 +39,19 @@ def bode(
 
     A negative phase margin belongs to a stable loop, too: one that a lead of the phase, and no lag, makes unstable.
     """
-    from orchestration.systems.system.connection import component_of
     from orchestration.theory.stability.frequency import bode as response_of
 
     found = response_of(request_from(scenario, flags, timing), component)
+    parts = found.components
     if out is not None:
-        _draw(found.plot(), out, component_of(found.outputs[0]))
-    rows = [("loop", "gain margin", "phase margin", "delay margin", "crossover", "peak of sensitivity")]
+        _draw(found.plot(), out, next(iter(parts)) if len(parts) == 1 else "")
+    rows = [("loop", "cut before", "gain margin", "phase margin", "delay margin", "crossover", "peak of sensitivity")]
     for loop in found.loops:
         phase, delay, crossover = loop.phase_margin, loop.delay_margin, loop.crossover
         rows.append(
             (
                 loop.output,
+                loop.input,
                 ", ".join(f"{one.factor:.4g} ({20.0 * math.log10(one.factor):.3g} dB)" for one in loop.gain_margins)
                 or "infinite",
                 "infinite" if phase is None else f"{phase:.4g}°",
@@ -56,15 +60,25 @@ def bode(
                 f"{loop.sensitivity_peak:.4g}",
             )
         )
+    curves = [
+        {
+            "dt": one.dt,
+            "outputs": one.outputs,
+            "frequencies": one.frequencies.tolist(),
+            "gains": abs(one.gains).tolist(),
+            "phases": one.phases.tolist(),
+        }
+        for one in parts.values()
+    ]
     document = {
-        "dt": found.dt,
         "stable": found.stable,
         "sensitivity_peak": found.sensitivity_peak,
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
-        "outputs": found.outputs,
-        "frequencies": found.frequencies.tolist(),
-        "gains": abs(found.gains).tolist(),
-        "phases": found.phases.tolist(),
+        **(
+            curves[0]
+            if len(curves) == 1
+            else {"components": [{"component": name, **one} for name, one in zip(parts, curves)]}
+        ),
     }
     lines = list(in_columns(rows, right=True)) if found.loops else []
     lines += [f"delay margin of {loop.output}: {loop.delay_reason}" for loop in found.loops if loop.delay_reason]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from orchestration.command.flags import FlightFlags, Timing, flight_options, request_from
+from orchestration.command.loops import Cut
 from orchestration.command.options import option
 from orchestration.command.registry import CommandResult
 from orchestration.foundation.basics.errors import UsageError
@@ -157,10 +158,7 @@ def linearise(
         Path | None, typer.Argument(help="System or scenario file, or SSP; without one, the paper's loop about hover.")
     ] = None,
     timing: Timing = None,
-    component: Annotated[
-        str | None,
-        option("--component", "Where the loop is cut open; default: the only component that is sampled.", "NAME"),
-    ] = None,
+    component: Cut = None,
     *,
     flags: FlightFlags,
 ) -> CommandResult:

@@ -1,6 +1,6 @@
 """The classes of the connections of a system, the order of its components at one instant, and the longest times."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -158,7 +158,7 @@ def ranked(members: Sequence[str], before: Iterable[tuple[str, str]]) -> tuple[s
     """
     followers: dict[str, set[str]] = {member: set() for member in members}
     for first, second in before:
-        if first in followers and second in followers and not _reaches(followers, second, first):
+        if first in followers and second in followers and not reaches(followers, second, first):
             followers[first].add(second)
     waiting = {member: sum(member in after for after in followers.values()) for member in members}
     result: list[str] = []
@@ -171,7 +171,8 @@ def ranked(members: Sequence[str], before: Iterable[tuple[str, str]]) -> tuple[s
     return tuple(result)
 
 
-def _reaches(followers: dict[str, set[str]], start: str, end: str) -> bool:
+def reaches(followers: Mapping[str, Iterable[str]], start: str, end: str) -> bool:
+    """Whether followers of a member, or theirs, include another; a member reaches itself."""
     seen, stack = set(), [start]
     while stack:
         member = stack.pop()

@@ -2,46 +2,39 @@
 
 import math
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from typing import overload
 
 import numpy as np
 
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.errors import UsageError
-from orchestration.foundation.basics.extras import explains_missing
 from orchestration.foundation.basics.simulator import Floats
-from orchestration.foundation.basics.terminal import progress_bar, warn
+from orchestration.foundation.basics.terminal import Share, inform, progress_bar, warn
 from orchestration.foundation.basics.unit_algebra import quantity
-from orchestration.foundation.processes.passable import passable
 from orchestration.simulation.requests.request import RequestLike, request_of
+from orchestration.systems.schedule.plan import reaches
 from orchestration.systems.system.distribution import lowest
 from orchestration.systems.system.files import files_of
 from orchestration.systems.system.model import System
 from orchestration.systems.system.request import Request, errors_in_own_terms, system_of
 from orchestration.theory.stability.delay_margin import Late, delay_margin, jumps_of
-from orchestration.theory.stability.in_double import of_code
 from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.linearise import (
     NEAR_ONE,
     Linearised,
-    clock_of,
     cut_open,
-    expect_sampled,
     in_isolation,
     rest_of_loop,
     sampled_component,
-    stability_of,
 )
-from orchestration.theory.stability.loop_at_rest import whole_at_rest
+from orchestration.theory.stability.loop_at_rest import AtRest, expect_whole_instances, whole_at_rest
 from orchestration.theory.stability.loop_halves import closed, radius
+from orchestration.theory.stability.loop_margins import Bode, Bodes, GainMargin, LoopMargins
 from orchestration.theory.stability.poles import Complexes
 from orchestration.theory.stability.state_space import StateSpace
-
-if TYPE_CHECKING:
-    from orchestration.simulation.figures.style import Figures
 
 LOWEST = 1e-5
 """Lowest frequency, as a share of the highest"""
@@ -54,145 +47,47 @@ BESIDE_A_TURN = 1e-4
 """Least distance of a frequency from whole turns in a period of several samples"""
 
 
-@passable
-@dataclass(frozen=True, kw_only=True)
-class GainMargin:
-    """A factor on a command beyond which the loop is unstable."""
-
-    factor: float
-    """The factor: below 1 the loop has to keep more of its gain, above 1 it stands no more."""
-    frequency: float
-    """The frequency at which the loop gain times the factor is -1 [rad/s]; 0: the loop drifts away."""
-
-
-@passable
-@dataclass(frozen=True, kw_only=True)
-class LoopMargins:
-    """The loop of one command, cut where it leaves the component, and its margins."""
-
-    input: str
-    """The inputs that the command goes to, as COMPONENT.VARIABLE."""
-    output: str
-    """The command, as COMPONENT.VARIABLE."""
-    gain_margin: float | None
-    """The factor on the command nearest to 1 at which the loop becomes unstable; None: infinite."""
-    gain_margins: tuple[GainMargin, ...]
-    """The nearest such factor below 1, and the one above, in rising order; a missing one: any factor on that side."""
-    phase_margin: float | None
-    """The smallest distance of the phase from that of -1 where the gain is 1 [deg]; None: it is nowhere 1."""
-    delay_margin: float | None
-    """The further delay of the command at which the loop becomes unstable [s]; None: infinite, or not known."""
-    delay_reason: str = ""
-    """Why the delay margin is not known; empty: it is."""
-    crossover: float | None
-    """The frequency of the phase margin [rad/s]; None: the gain is nowhere 1."""
-    sensitivity_peak: float
-    """The largest absolute value of the sensitivity 1 / (1 + L)."""
-
-
-@passable
-@dataclass(frozen=True, kw_only=True)
-class Bode:
-    """The loops of a component about its operating point, one for each command, with the others closed."""
-
-    dt: float
-    """Time from sample to sample [s]."""
-    samples: int = 1
-    """Samples of the component in a period of all rates; margins are of a command at all of them."""
-    stable: bool
-    """Whether the closed loop is stable; margins are those of a stable loop only."""
-    radius: float
-    """The spectral radius of the closed loop over a period."""
-    sensitivity_peak: float | None
-    """The largest of the loops' peaks; None: the loop is unstable."""
-    loops: tuple[LoopMargins, ...]
-    """The loops with their margins; empty if the loop is unstable."""
-    outputs: tuple[str, ...]
-    """The commands, one for each loop, as COMPONENT.VARIABLE; also of an unstable loop."""
-    frequencies: Floats = field(repr=False)
-    """Frequencies up to half the sampling rate [rad/s], shape (n,)."""
-    gains: Complexes = field(repr=False)
-    """Loop gains L at them, which negative feedback closes, shape (loops, n)."""
-    in_double: tuple[str, ...] = ()
-    """The components whose float code in C is taken in double precision."""
-
-    def __repr__(self) -> str:
-        return f"<Bode: {self.verdict}>"
-
-    @property
-    def phases(self) -> Floats:
-        """Phases without jumps [deg], shape (loops, n), from between -270 and 90 at the lowest frequency.
-
-        Those of a loop whose margin would be at +180 are whole turns lower, so that it is at -180.
-        """
-        phases = np.degrees(np.unwrap(np.angle(self.gains), axis=-1))
-        unturned: Floats = phases - 360.0 * np.ceil((phases[:, :1] - 91.0) / 360.0)
-        for phase, loop in zip(unturned, self.loops):
-            phase -= max(0.0, critical_phase(loop, self.frequencies, phase) + 180.0)
-        return unturned
-
-    @property
-    def verdict(self) -> str:
-        """The smallest margins of a loop, or that it is unstable and has none."""
-        clock = clock_of(self.dt, self.samples)
-        if not self.stable:
-            return f"{stability_of(self.radius)}, {clock}: an unstable loop has no margins"
-        factors = [one.factor for loop in self.loops for one in loop.gain_margins]
-        below, above = [x for x in factors if x < 1.0], [x for x in factors if x > 1.0]
-        gains = [f"{one:.3g}" for one in (max(below, default=None), min(above, default=None)) if one is not None]
-        phases = [loop.phase_margin for loop in self.loops if loop.phase_margin is not None]
-        delays = [loop.delay_margin for loop in self.loops if loop.delay_margin is not None]
-        margins = [
-            f"gain margin{'s' * (len(gains) - 1)} {' and '.join(gains)}" if gains else "infinite gain margin",
-            f"phase margin {min(phases, key=abs):.3g}°" if phases else "infinite phase margin",
-            "delay margin not known"
-            if any(loop.delay_reason for loop in self.loops)
-            else f"delay margin {quantity(min(delays), 's')}"
-            if delays
-            else "infinite delay margin",
-        ]
-        return f"stable, {clock}: {', '.join(margins)} (small deviations{of_code(self.in_double)})"
-
-    @explains_missing
-    def plot(self, *, style: Literal["screen", "paper", "slides"] = "screen") -> "Figures":
-        """The loop gain, its phase and the sensitivity over the frequency; a notebook shows it.
-
-        `style` sets its size and fonts. Raises `UsageError` for an unknown style.
-        """
-        from orchestration.simulation.figures.style import Figures, style_named
-        from orchestration.theory.stability.loop_figures import bode_figure
-
-        chosen = style_named(style)
-        with chosen.applied():
-            return Figures({"bode": bode_figure(self, chosen)}, chosen)
-
-
-def critical_phase(loop: LoopMargins, frequencies: Floats, phase: Floats) -> float:
-    """The phase of -1 from which a loop has its margin on the course of its phase [deg]: -180 and whole turns."""
-    at, turn = loop.crossover, loop.phase_margin
-    if at is None or turn is None:
-        at, turn = next((one.frequency for one in loop.gain_margins), None), 0.0
-    if at is None:
-        return -180.0
-    return 360.0 * round((float(np.interp(at, frequencies, phase)) - turn + 180.0) / 360.0) - 180.0
-
-
-def bode(request: RequestLike, component: str | None = None) -> Bode:
+@overload
+def bode(request: RequestLike, component: str) -> Bode: ...
+@overload
+def bode(request: RequestLike, component: None = None) -> Bode | Bodes: ...
+def bode(request: RequestLike, component: str | None = None) -> Bode | Bodes:
     """The loop gains of a sampled component with all holds and delays, about the operating point, and their margins.
 
-    As `linearise`, of which it is the frequency response: default `component` is the only sampled one. Each loop is cut
-    at one command, with the others closed. A delay margin is exact also for parts of a period: the loop is linearised
-    with it.
+    As `linearise`, of which it is the frequency response. Each loop is cut at one command, with the others closed.
+    Without `component` those of each sampled component whose commands come back to it: `Bodes` if there are several. A
+    delay margin is exact also for parts of a period: the loop is linearised with it.
 
     Raises `UsageError` as `linearise`, and for a loop whose stability rounding may decide.
     """
-    expect_sampled(request, component)
+    with errors_in_own_terms(asked := request_of(request)):
+        names = _cut_at(rested(asked, checked=False), component)
     for one, other, interval in stepped_couplings(system_of(request_of(request))):
         warn(
             f"{one} and {other} run in continuous time, and exchange every {quantity(interval, 's')}: the loop is that "
             "of this stepped coupling; with shorter steps the margins may differ"
         )
-    return in_isolation(request, _bode, component)
+    found = in_isolation(request, _bode, names)
+    return found[0] if len(names) == 1 else Bodes(components=dict(zip(names, found, strict=True)))
+
+
+def _cut_at(system: System, component: str | None) -> list[str]:
+    """The sampled components whose loops are asked for: those whose commands come back to them."""
+    asked = [name for name, each in system.components.items() if each.sampling is not None]
+    if component is not None or len(asked) < 2:
+        asked = [sampled_component(system, component)]
+    expect_whole_instances(system)
+    receivers = {name: {x.receiver for x in system.connections if x.sender == name} for name in system.components}
+    found = [name for name in asked if any(reaches(receivers, one, name) for one in receivers[name])]
+    left = [name for name in asked if name not in found]
+    if not found:
+        raise UsageError(
+            f"no loop goes through {', '.join(left)}: expected a sampled component to which connections "
+            "bring back what it sends"
+        )
+    if left:
+        inform(f"in no loop, left out: {', '.join(left)}")
+    return found
 
 
 def stepped_couplings(system: System) -> list[tuple[str, str, float]]:
@@ -216,35 +111,41 @@ def expect_decided(loop: Linearised) -> None:
     if loop.rest.D[~follows].any() or (whole < 1.0) != (max(whole, by_halves) < 1.0):
         raise UsageError(
             f"the loop as a whole has a spectral radius of {whole:.6g}, its two halves one of {by_halves:.6g}: "
-            "the loop cannot be cut open there"
+            f"the loop cannot be cut open at {loop.name}"
         )
 
 
-def _bode(request: Request, component: str | None) -> Bode:
+def _bode(request: Request, names: list[str]) -> tuple[Bode, ...]:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = rested(request)
-        name = sampled_component(system, component)
         models = files_of(system).models_of(system)
         with progress_bar("margins") as report, whole_at_rest(system, instances, models=models) as rest:
-            loop, calm = cut_open(rest, name), rest.simulation.system
+            found = list[Bode]()
+            for name in names:
+                found.append(_of_component(rest, name, system, lambda share: report((len(found) + share) / len(names))))
+            return tuple(found)
 
-            @cache
-            def later(delay: float) -> StateSpace:
-                return rest_of_loop(rest, name, delayed(calm, name, delay).connections)
 
-            turn = loop.samples if calm.uses_scheduler else 1
-            late = Late(rest=later, jumps=jumps_of(calm, name), turn=turn)
-            expect_decided(loop)
-            frequencies, stable = _frequencies(loop), loop.radius < 1.0
-            curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
-            gains = np.array([curve for curve, _ in curves])
-            half = math.pi / loop.rest.dt  # of the period: beyond are the same gains
-            below = np.append(frequencies[frequencies < half], half)
-            each = (_margins(loop, i, below, curves[i][1], late, system) for i in _commands(loop))
-            found = list[LoopMargins]()
-            for margins in each if stable else ():
-                found.append(margins)
-                report(len(found) / len(gains))
+def _of_component(rest: AtRest, name: str, system: System, report: Share) -> Bode:
+    loop, calm = cut_open(rest, name), rest.simulation.system
+
+    @cache
+    def later(delay: float) -> StateSpace:
+        return rest_of_loop(rest, name, delayed(calm, name, delay).connections)
+
+    turn = loop.samples if calm.uses_scheduler else 1
+    late = Late(rest=later, jumps=jumps_of(calm, name), turn=turn)
+    expect_decided(loop)
+    frequencies, stable = _frequencies(loop), loop.radius < 1.0
+    curves = [lifted_gains(loop, i, frequencies) for i in _commands(loop)]
+    gains = np.array([curve for curve, _ in curves])
+    half = math.pi / loop.rest.dt  # of the period: beyond are the same gains
+    below = np.append(frequencies[frequencies < half], half)
+    each = (_margins(loop, i, below, curves[i][1], late, system) for i in _commands(loop))
+    found = list[LoopMargins]()
+    for margins in each if stable else ():
+        found.append(margins)
+        report(len(found) / len(gains))
     return Bode(
         dt=loop.dt, samples=loop.samples, stable=stable, radius=loop.radius, loops=tuple(found),
         outputs=tuple(_output(loop, i) for i in _commands(loop)), frequencies=frequencies, gains=gains,

@@ -19,7 +19,7 @@ from orchestration.simulation.figures.palette import BLACK, BLUE, CYCLE, DASHES,
 from orchestration.simulation.figures.style import SCREEN, Style
 from orchestration.simulation.results.display_names import signal, unit
 from orchestration.simulation.results.quantities import Quantity, setting
-from orchestration.theory.stability.frequency import Bode, LoopMargins, critical_phase
+from orchestration.theory.stability.loop_margins import Bode, LoopMargins, critical_phase
 from orchestration.theory.stability.root_locus import RootLocus
 from orchestration.theory.stability.step import Step
 from orchestration.theory.stability.step_response import StepResponse
@@ -57,33 +57,49 @@ ACROSS: Sequence[dict[str, Any]] = (
     {"xytext": (0.0, -3.0), "va": "top", "ha": "center"},
     {"xytext": (0.0, 3.0), "va": "bottom", "ha": "center"},
 )
-"""Ways to write beside a point"""
+ASIDE: Sequence[dict[str, Any]] = (
+    {"xytext": (3.0, 3.0), "va": "bottom"},
+    {"xytext": (-3.0, -3.0), "va": "top", "ha": "right"},
+    {"xytext": (-3.0, 3.0), "va": "bottom", "ha": "right"},
+    {"xytext": (3.0, -3.0), "va": "top"},
+)
+"""Ways to write beside a point, the last those on either side of a curve"""
+PLACES = 15
+"""Points of a curve beside which its name may be"""
 FAR = 3.0
 """Factor on the distance, and on its further steps, where there is no room"""
 Label: TypeAlias = tuple[Axes, str, str, list[tuple[float, float, dict[str, Any]]]]
 """A text with its color, and the points beside which it may be, and in which way, the best first"""
 
 
-def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
-    """The gain of each loop, its phase, and its sensitivity; lines are gain and phase margins, at their crossovers."""
+def bode_figure(results: Sequence[Bode], style: Style = SCREEN) -> Figure:
+    """The gain of each loop of some components, its phase, and its sensitivity, up to half its sampling rate.
+
+    Lines are gain and phase margins, at their crossovers; each curve of several has its name beside it.
+    """
     figure = style.figure(66.0)
     above, middle, below = figure.subplots(3, sharex=True)
-    several = len(result.outputs) > 1
+    curves = [
+        (result.frequencies, gain, phase, output, result.loops[i] if result.stable else None)
+        for result in results
+        for i, (gain, phase, output) in enumerate(zip(result.gains, result.phases, result.outputs, strict=True))
+    ]
+    several = len(curves) > 1
     margins, labels = [0.0], list[Label]()
-    for i, (gain, phase, output) in enumerate(zip(result.gains, result.phases, result.outputs, strict=True)):
+    for i, (frequencies, gain, phase, output, loop) in enumerate(curves):
         color = CYCLE[i % len(CYCLE)]
         how = {"color": color, "linestyle": DASHES[i % len(DASHES)]}
-        loop = result.loops[i] if result.stable else None
         phase[np.abs(gain) < LEAST] = np.nan
-        name = signal(output, {})
-        label = f"{name}: {_sizes(loop)}" if several and loop is not None else name
-        above.plot(result.frequencies, _decibels(np.abs(gain)), label=label, **how)
-        middle.plot(result.frequencies, phase, **how)
-        below.plot(result.frequencies, _decibels(np.abs(1.0 / (1.0 + gain))), **how)
+        name, decibels = signal(output, {}), _decibels(np.abs(gain))
+        above.plot(frequencies, decibels, **how)
+        middle.plot(frequencies, phase, **how)
+        below.plot(frequencies, _decibels(np.abs(1.0 / (1.0 + gain))), **how)
         if loop is not None:
-            margins.append(critical_phase(loop, result.frequencies, phase) + min(0.0, loop.phase_margin or 0.0))
-            labels += _mark_margins((above, middle), loop, result.frequencies, phase, color, labelled=not several)
-    if not result.stable:
+            margins.append(critical_phase(loop, frequencies, phase) + min(0.0, loop.phase_margin or 0.0))
+            labels += _mark_margins((above, middle), loop, frequencies, phase, color, labelled=not several)
+        text = f"{name}\n{_sizes(loop)}" if several and loop is not None else name
+        labels.append((above, text, color, _beside(frequencies, decibels)))
+    if not all(result.stable for result in results):
         above.set_title("closed, the loop is unstable: it has no margins")
     for axes in (above, below):
         axes.axhline(0.0, color=GREY, linewidth=1.0, linestyle=":")
@@ -96,19 +112,29 @@ def bode_figure(result: Bode, style: Style = SCREEN) -> Figure:
         if turns:
             middle.axhline(360.0 * turns - 180.0, color=GREY, linewidth=1.0, linestyle=":")
     middle.yaxis.set_major_locator(MultipleLocator(next((a for a in ANGLES if high - low <= 5.0 * a), ANGLES[-1])))
+    which = "the" if len(results) == 1 else "each"
     above.set(ylabel="loop gain |L| [dB]", xscale="log")
     middle.set(ylabel="phase of L [°]")
-    below.set(ylabel="sensitivity |1 / (1 + L)| [dB]", xlabel="frequency [rad/s], up to half the sampling rate")
-    below.set_xlim(result.frequencies[0], result.frequencies[-1])
+    below.set(ylabel="sensitivity |1 / (1 + L)| [dB]", xlabel=f"frequency [rad/s], up to half {which} sampling rate")
+    lowest, highest = (end(result.frequencies[i] for result in results) for i, end in ((0, min), (-1, max)))
+    below.set_xlim(lowest, highest)
     hertz = above.twiny()
-    hertz.set(xscale="log", xlabel="frequency [Hz]", xlim=result.frequencies[[0, -1]] / math.tau)
+    hertz.set(xscale="log", xlabel="frequency [Hz]", xlim=(lowest / math.tau, highest / math.tau))
     hertz.grid(visible=False)
     hertz.spines["top"].set_visible(True)
     for axes in (below, hertz):
         plain(axes.xaxis)
-    figure.legend(loc="outside lower center", ncols=2)
     _label_freely(figure, labels)
     return figure
+
+
+def _beside(frequencies: Floats, curve: Floats) -> list[tuple[float, float, dict[str, Any]]]:
+    """Places for the name of a curve: beside points of it, from its middle to its ends."""
+    seen = np.flatnonzero(np.isfinite(curve))
+    across = np.log(frequencies[seen])
+    at = np.interp(np.linspace(across[0], across[-1], PLACES), across, seen).astype(int) if len(seen) else ()
+    nearest = sorted(at, key=lambda k: abs(math.log(frequencies[k] ** 2 / frequencies[0] / frequencies[-1])))
+    return [(float(frequencies[k]), float(curve[k]), how) for k in nearest for how in (*ASIDE, *SIDEWAYS)]
 
 
 def _decibels(gain: Floats) -> Floats:
@@ -116,7 +142,7 @@ def _decibels(gain: Floats) -> Floats:
 
 
 def _sizes(loop: LoopMargins) -> str:
-    """The margins of a loop in the legend, where those of several loops would hide each other."""
+    """The margins of a loop below its name, where those of several loops would hide each other."""
     sizes = [f"× {one.factor:.3g}" for one in loop.gain_margins]
     return ", ".join([*sizes, "infinite" if loop.phase_margin is None else f"{loop.phase_margin:.3g}°"])
 
@@ -153,7 +179,7 @@ def _label_freely(figure: Figure, labels: Sequence[Label]) -> None:
     figure.draw_without_rendering()  # so that axes have their sizes
     for axes, size, color, places in labels:
         curves = [
-            (each.get_transform().transform_path(each.get_path()), 1 if each.get_linestyle() == ":" else 10)
+            (each.get_transform().transform_path(each.get_path()), 1 if each.get_color() == GREY else 10)
             for each in axes.lines
         ]
         others = [each.get_window_extent() for each in axes.texts]

@@ -243,7 +243,7 @@ def test_a_loop_of_code_of_two_rates_has_the_poles_and_margins_of_a_map_made_by_
         return float(np.abs(np.linalg.eigvals(by_hand(factor, late))).max())
 
     system = load_system(file)
-    found = bode(system)
+    found = bode(system, "controller")
     (loop,) = found.loops
     assert (found.dt, found.samples, found.radius) == (0.05, 5, pytest.approx(radius(1.0), abs=1e-9))
     assert loop.gain_margin is not None

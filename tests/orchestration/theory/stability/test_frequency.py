@@ -16,11 +16,12 @@ from orchestration.systems.system.paths import changed
 from orchestration.theory.stability import frequency
 from orchestration.theory.stability import linearise as linearise_module
 from orchestration.theory.stability.delay_margin import Late, LateCommand, delay_margin, jumps_of
-from orchestration.theory.stability.frequency import GainMargin, delayed, expect_decided, stepped_couplings
+from orchestration.theory.stability.frequency import delayed, expect_decided, stepped_couplings
 from orchestration.theory.stability.lifted_margins import gain_margins, lifted_gains, phase_margin
 from orchestration.theory.stability.loop_halves import closed, sensitivity_of
+from orchestration.theory.stability.loop_margins import GainMargin
 from orchestration.theory.stability.resolvent import Resolvent
-from quadcosim import Bode, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
+from quadcosim import Bode, Bodes, Linearised, Sampling, StateSpace, Step, UsageError, bode, linearise, locus, step
 from tests.commands import Main
 from tests.examples.common import native_example as example
 from tests.extent import sample
@@ -38,7 +39,7 @@ def system_of(name: str) -> System:
 
 @cache
 def bode_of(name: str) -> Bode:
-    return bode(system_of(name))
+    return bode(system_of(name), "controller")
 
 
 @cache
@@ -261,7 +262,7 @@ def test_beside_whole_turns_in_a_period_of_five_samples_gains_and_sensitivity_ar
 
 def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
     late = changed(system_of("dc_servo"), {DELAY: 0.02})
-    found = bode(late)
+    found = bode(late, "controller")
     assert (found.stable, found.loops, found.sensitivity_peak) == (False, (), None)
     gain, *_ = found.plot()["bode"].axes  # its loop gain is drawn all the same
     assert gain.lines[0].get_ydata() == pytest.approx(20.0 * np.log10(np.abs(found.gains[0])))
@@ -279,7 +280,7 @@ def test_a_loop_that_rounding_decides_is_refused_and_so_are_halves_that_are_not_
     with pytest.raises(UsageError, match="neither stable nor unstable"):
         expect_decided(dataclasses.replace(loop, radius=1.0 + 1e-9))
     law = dataclasses.replace(loop.component, C=10.0 * loop.component.C, D=10.0 * loop.component.D)
-    with pytest.raises(UsageError, match="cannot be cut open there"):
+    with pytest.raises(UsageError, match="cannot be cut open at controller"):
         expect_decided(dataclasses.replace(loop, component=law))
     assert np.abs(np.linalg.eigvals(closed(loop).A)).max() == pytest.approx(loop.radius, rel=1e-9)
 
@@ -310,6 +311,80 @@ def test_a_loop_of_one_rate_has_the_same_margins_over_a_period_of_two() -> None:
     stepped, (of_step,) = step(both, "controller"), step_of("dc_servo").loops
     assert stepped.loops[0].overshoot == pytest.approx(of_step.overshoot, rel=1e-6)
     assert stepped.responses[0, :40] == pytest.approx(step_of("dc_servo").responses[0, :40], abs=1e-9)
+
+
+@cache
+def cascade() -> Bodes:
+    """The loop of one servo, cut open before it and after it; it is sampled twice as often as its controller."""
+    found = bode(in_cascade())
+    assert isinstance(found, Bodes)
+    return found
+
+
+def in_cascade() -> System:
+    one = system_of("dc_servo")
+    servo = dataclasses.replace(one.components["servo"], step=None, sampling=Sampling(period=0.003))
+    return dataclasses.replace(one, components={**one.components, "servo": servo})
+
+
+def test_each_component_of_a_cascade_is_cut_open_and_one_loop_stands_the_same_factor_wherever_it_is_cut() -> None:
+    found, alone = cascade(), bode(in_cascade(), "controller")
+    assert found.components["controller"].loops == alone.loops
+    after, before = found.loops
+    assert [(one.output, one.input) for one in found.loops] == [
+        ("servo.angle", "controller.angle"), ("controller.u", "servo.u"),
+    ]  # fmt: skip
+    assert [one.factor for one in after.gain_margins] == pytest.approx([x.factor for x in before.gain_margins])
+    assert (after.phase_margin, after.crossover) == pytest.approx((before.phase_margin, before.crossover))
+    assert found.verdict.startswith("stable, loops of servo every 3 ms, controller every 6 ms: gain margins 0.162 of ")
+    assert found.verdict.endswith(", delay margin 12 ms of servo.angle (small deviations)")
+    assert repr(found) == f"<Bodes: {found.verdict}>"
+    for name, dt in (("servo", 0.003), ("controller", 0.006)):
+        assert found.components[name].frequencies[-1] == pytest.approx(math.pi / dt, rel=0.01)
+    unstable = {
+        name: dataclasses.replace(one, stable=False, radius=2.0, loops=()) for name, one in found.components.items()
+    }
+    told = dataclasses.replace(found, components=unstable)
+    assert (told.stable, told.loops, told.sensitivity_peak) == (False, (), None)
+    assert told.verdict.startswith("unstable: spectral radius 2, loops of servo every 3 ms, controller every 6 ms: an")
+
+
+def test_curves_of_a_cascade_are_named_each_up_to_half_its_own_rate() -> None:
+    gain, *_ = cascade().plot()["bode"].axes
+    curves = (at for line in gain.lines if len(at := np.asarray(line.get_xdata())) > 2)  # not lines of margins
+    for at, text, (name, one) in zip(curves, gain.texts, cascade().components.items(), strict=True):
+        assert at == pytest.approx(one.frequencies)
+        assert text.get_text().startswith(f"{name}: ")
+    assert gain.get_xlim()[1] == pytest.approx(cascade().components["servo"].frequencies[-1])
+    wide = {
+        name: dataclasses.replace(one, outputs=one.outputs * 5, loops=one.loops * 5, gains=np.tile(one.gains, (5, 1)))
+        for name, one in cascade().components.items()
+    }
+    assert set(dataclasses.replace(cascade(), components=wide).plot()) == {"bode_servo", "bode_controller"}
+
+
+def test_a_component_in_no_loop_is_left_out_and_refused_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    one = system_of("dc_servo")
+    beside = dataclasses.replace(one, components={**one.components, "logger": one.components["controller"]})
+    assert list(bode(beside).components) == ["controller"]
+    assert "in no loop, left out: logger" in capsys.readouterr().err
+    with pytest.raises(UsageError, match=r"^no loop goes through logger: expected"):
+        bode(beside, "logger")
+
+
+def test_the_command_prints_a_line_for_each_loop(main: Main, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(frequency, "bode", lambda *_: cascade())
+    file = EXAMPLES / "dc_servo" / "system.toml"
+    told = main("bode", file, "--out", tmp_path).stdout.splitlines()
+    lines = [["servo.angle", "controller.angle"], ["controller.u", "servo.u"]]
+    assert [line.split()[:2] for line in told[-2:]] == lines
+    assert (tmp_path / "bode.png").exists()
+    document = json.loads(main("bode", file, "--json").stdout)
+    assert document.keys() == {"verdict", "stable", "sensitivity_peak", "loops", "components"}
+    assert [[one["output"], one["input"]] for one in document["loops"]] == lines
+    drawn = {"component", "dt", "outputs", "frequencies", "gains", "phases"}
+    assert all(one.keys() == drawn for one in document["components"])
+    assert {one["component"]: one["dt"] for one in document["components"]} == {"servo": 0.003, "controller": 0.006}
 
 
 def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Path) -> None:
@@ -350,7 +425,7 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     turned = [[loop.crossover] * 2, [-180.0, loop.phase_margin - 180.0]]
     assert np.transpose(phase.lines[1].get_xydata()) == pytest.approx(np.array(turned), rel=1e-4)
     assert [text.get_text() for axes in (gain, phase) for text in axes.texts] == [
-        "× 0.169 (-15.4 dB)", "× 3.25 (10.3 dB)", "33.7°",
+        "× 0.169 (-15.4 dB)", "× 3.25 (10.3 dB)", "controller: u", "33.7°",
     ]  # fmt: skip
     peak = 20.0 * np.log10(loop.sensitivity_peak)
     assert np.max(np.asarray(sensitivity.lines[0].get_ydata())) == pytest.approx(peak)
@@ -389,7 +464,7 @@ def test_the_size_of_a_margin_crosses_no_curve_where_the_gain_is_1_beside_a_reso
     loop = dataclasses.replace(known, crossover=420.0, gain_margins=(margin,))
     drawn = dataclasses.replace(bode_of("dc_servo"), loops=(loop,), frequencies=frequencies, gains=gains)
     gain, *_ = drawn.plot()["bode"].axes
-    curve, (size,) = gain.lines[0], gain.texts
+    curve, (size, _) = gain.lines[0], gain.texts
     box, path = size.get_window_extent(), curve.get_transform().transform_path(curve.get_path())
     assert not path.intersects_bbox(box, filled=False)
     assert gain.bbox.containsx(box.x1)
