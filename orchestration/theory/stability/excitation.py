@@ -254,8 +254,16 @@ class Excitation:
 
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
-        up, down = (self.course(self.rest, [(x, rung) for x in self.held + move * moves]) for move in MOVES)
+        up, down = (self._moved(move * moves, rung) for move in MOVES)
         return np.asarray(0.5 * (up - down))
+
+    def one_sided(self, moves: Floats, rung: Rung) -> Floats:
+        """What is alike in the responses to such deviations and to their opposite: of a linear instance nothing."""
+        up, down, still = (self._moved(move * moves, rung) for move in (*MOVES, 0.0))
+        return np.asarray(0.5 * (up + down) - still)
+
+    def _moved(self, moves: Floats, rung: Rung) -> Floats:
+        return self.course(self.rest, [(x, rung) for x in self.held + moves])
 
     # -- coarse rounding -------------------------------------------------------------------------------------------
 

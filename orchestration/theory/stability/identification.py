@@ -11,7 +11,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.stability.excitation import COARSE, FINER, MAX_PULSE, Excitation, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import EXACT, Tangent
-from orchestration.theory.stability.matrices import misfit
+from orchestration.theory.stability.matrices import GOLDEN, misfit
 
 HORIZON, LONGER_BY, LAST_HORIZON = 16.0, 8.0, 1024.0
 """Length of the first ladder, in periods, factor from one to the next, and length of the last: longer ones are tried
@@ -40,8 +40,6 @@ FEWEST = 6
 """Samples at which its states are produced at least"""
 TURN = 1e-3
 """Difference of the responses to a pulse on all inputs at two samples, up to which they are alike"""
-GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-"""the least rational share of all"""
 MOST_SAMPLES = 20
 """Samples after which the response of a component of several rates repeats, at most"""
 FEWEST_LIFTED = 8

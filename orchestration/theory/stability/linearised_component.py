@@ -35,6 +35,10 @@ SCALINGS = 4
 """Rounds in which rows and columns are scaled to errors of one size"""
 UNPROVEN = 1e-5
 """Error of a predicted response, relative to the largest of that output, from which a linear model is refused"""
+ONE_SIDED = 1e-3
+"""Share of a response that may be alike for a move and its opposite: measurement explains less"""
+SMALLER = 0.125
+"""Factor on moves by which that share falls, too, of what is smooth"""
 PROOF_STEPS = 256
 """Steps of the random input, at most"""
 PARTS = 64
@@ -204,7 +208,8 @@ class Tangent(LinearSimulator):
             after = by_state @ state + by_input @ move
             predicted[k], state = after[:cut], after[cut:]
         growth = max(1.0, float(np.abs(np.linalg.eigvals(by_state[cut:])).max(initial=0.0)))
-        shrunk = growth ** -np.arange(count)[:, None]  # slow states are not hidden by those that grow
+        # slow states are not hidden by those that grow
+        shrunk = np.asarray(growth ** -np.arange(count, dtype=float)[:, None], dtype=float)
         largest = np.abs(shrunk * measured).max(axis=0, initial=0.0)
         error = np.abs(shrunk * (measured - predicted)).max(axis=0, initial=0.0)
         error = np.maximum(error - STANDS_OUT * excitation.rounding, 0.0)
@@ -215,6 +220,27 @@ class Tangent(LinearSimulator):
                 f"response to a random input over {count * h:.3g} s: off by {self.accuracy:.1g} of the largest, "
                 f"expected at most {UNPROVEN:g}"
             )
+        self._expect_two_sided(excitation, moves, rung, largest, shrunk)
+
+    def _expect_two_sided(
+        self, excitation: Excitation, moves: Floats, rung: Rung, largest: Floats, shrunk: Floats
+    ) -> None:
+        """Raise `UsageError` where moves differ from their opposite in effect, and smaller ones by as large a share.
+
+        The mean of both would be taken for the response to either.
+        """
+        before = 0.0
+        for factor in (1.0, SMALLER):
+            alike = np.abs(shrunk * excitation.one_sided(factor * moves, rung)).max(axis=0, initial=0.0)
+            alike = np.maximum(alike - STANDS_OUT * excitation.rounding, 0.0) / factor
+            share = float((alike / np.where(largest > 0.0, largest, excitation.pulse)).max(initial=0.0))
+            if share <= max(ONE_SIDED, 0.5 * before):
+                return
+            before = share
+        raise UsageError(
+            f"{excitation.name}: small changes of its inputs up and down differ in effect, by {before:.1g} of it "
+            "however small they are, as where it rests just at a limit: expected another operating point"
+        )
 
     def foretells(self, end: float, longest: float) -> bool:
         """Whether it predicts the response to a pulse up to a later time [s], in steps of `longest` at most.

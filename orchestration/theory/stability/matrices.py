@@ -17,6 +17,10 @@ from orchestration.theory.stability.linearised_component import Tangent
 NEAR, FAR = 0.1, 0.5
 """Norms of Φ(h) - I between which its logarithm is most accurate"""
 HALVINGS = 40
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+"""the least rational share of all"""
+TURNED = 0.2
+"""Difference of logarithms over a step and over that share of it, from which a state turns about within the step"""
 INEXACT = 1e-7
 """Difference of Φ(2h) to Φ(h)² allowed, both by small differences; beyond it the component is no linear system in
 continuous time"""
@@ -239,9 +243,23 @@ def _informative_step(tangent: Tangent, first: float) -> float:
             h = whole_nanoseconds(0.5 * h)
         elif size < NEAR and h < 64.0 * first:
             h = 2.0 * h
+        elif _turns_within(tangent, h):
+            first = h = whole_nanoseconds(GOLDEN * h)
         else:
             break
     return h
+
+
+def _turns_within(tangent: Tangent, h: float) -> bool:
+    """Whether a state turns about within a step and is nearly back at its end: over a part of it, it is elsewhere."""
+    rates, count = list[Floats](), len(tangent.outputs)
+    for step in (h, whole_nanoseconds(GOLDEN * h)):
+        after = tangent.derivatives(step)[0][count:]
+        change = after - np.eye(len(after))
+        if len(change) and np.linalg.norm(change, 2) > 2.0 * FAR:
+            return step < h
+        rates.append(_logarithm(change) / step)
+    return bool(np.abs(rates[0] - rates[1]).max(initial=0.0) * h > TURNED)
 
 
 def whole_nanoseconds(seconds: float) -> float:

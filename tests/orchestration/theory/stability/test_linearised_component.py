@@ -186,6 +186,60 @@ def test_of_rates_far_apart_a_plant_is_measured_over_the_shortest_and_foretells_
     assert not found.foretells(10.0, 0.1)
 
 
+class Swinging(Line):
+    """One that swings whole times in a millisecond, beside a slow decay that the output shows more of."""
+
+    def __init__(self, times: int) -> None:
+        w = 2.0 * np.pi * 1e3 * times
+        self.kept, self.u = np.zeros(3), 0.0
+        self.A = np.array([[-1.0, w, 0.0, 0.0], [-w, -1.0, 0.0, w], [0.0, 0.0, -1.0, 1.0], [0.0] * 4])
+
+    def reader(self, names: Any, into: Floats) -> Transfer:
+        def read() -> None:
+            into[0] = 0.01 * self.kept[0] + self.kept[2]
+
+        return read
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = (expm(h * self.A) @ np.append(self.kept, self.u))[:3]
+
+
+@pytest.mark.parametrize("times", [1, 4, 8])
+def test_what_swings_whole_times_in_a_step_is_seen_by_another_one(times: int) -> None:
+    plant = Swinging(times)
+    found = matrices.in_continuous_time(in_continuous_time(rest(plant), 0.001, 0.001), 0.001)
+    assert np.abs(np.linalg.eigvals(found.A).imag).max() == pytest.approx(2.0 * np.pi * 1e3 * times, rel=1e-6)
+
+
+class Leaning(Line):
+    """One that follows its input by a factor upward and by another one downward."""
+
+    def __init__(self, up: float, down: float) -> None:
+        self.kept, self.u, self.up, self.down = np.zeros(1), 0.0, up, down
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = 0.5 * self.kept + np.array([self.up * max(self.u, 0.0) + self.down * min(self.u, 0.0)])
+
+
+@pytest.mark.parametrize(("up", "down"), [(2.0, 0.0), (1.01, 1.0)], ids=["at a limit", "kinked"])
+def test_what_follows_inputs_up_by_another_factor_than_down_is_refused(up: float, down: float) -> None:
+    """It responds to any pulse up and down, one less the other, as by the mean of both factors."""
+    with pytest.raises(UsageError, match=r"up and down differ in effect, by .* as where it rests just at a limit"):
+        tangent(Leaning(up, down))
+    assert responses(tangent(Leaning(2.0, 2.0)), 2) == pytest.approx([2.0, 1.0])
+
+
+class Bending(Line):
+    """One that bends smoothly: a larger move up does more than one down."""
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = 0.5 * self.kept + self.u + 1e4 * self.u**2
+
+
+def test_what_bends_smoothly_is_linear_for_small_moves() -> None:
+    assert responses(tangent(Bending(1)), 2) == pytest.approx([1.0, 0.5])
+
+
 class Alternating(Line):
     """One that takes its input at every fourth step only, by a counter, and counts its steps."""
 
