@@ -121,4 +121,5 @@ def _informative_step(loop: AtRest, name: str) -> float:
         return component.sampling.period
     if not loop.simulation.instances[name].model.varies_step:
         return component.step or 0.0
-    return whole_nanoseconds(float(min(periods_of(loop.simulation.system))) / NANOSECONDS / 4.0)
+    quickest = whole_nanoseconds(float(min(periods_of(loop.simulation.system))) / NANOSECONDS / 4.0)
+    return max(quickest, component.step or 0.0)  # shorter ones than its own differ less than those that are simulated
