@@ -115,15 +115,15 @@ def step(
     found = response_of(request_from(scenario, flags, timing), component)
     if out is not None:
         _draw(found.plot(), out, component_of(found.loops[0].output))
-    rows = [("loop", "rise time", "overshoot", "settling time", "final value")]
+    rows = [("loop", "rise time", "undershoot", "overshoot", "settling time", "final value")]
     for loop in found.loops:
         rise = "-" if loop.rise_time is None else quantity(loop.rise_time, "s")
-        over = "-" if loop.overshoot is None else f"{loop.overshoot:.3g} %"
-        rows.append((loop.output, rise, over, quantity(loop.settling_time, "s"), f"{loop.steady_state:.4g}"))
+        under, over = ("-" if size is None else f"{size:.3g} %" for size in (loop.undershoot, loop.overshoot))
+        rows.append((loop.output, rise, under, over, quantity(loop.settling_time, "s"), f"{loop.steady_state:.4g}"))
     slowest = dataclasses.asdict(found.slowest)
     document = {
         "dt": found.dt,
-        **{name: slowest[name] for name in ("rise_time", "overshoot", "settling_time", "steady_state")},
+        **{name: slowest[name] for name in ("rise_time", "undershoot", "overshoot", "settling_time", "steady_state")},
         "loops": [dataclasses.asdict(loop) for loop in found.loops],
         "times": found.times.tolist(),
         "responses": found.responses.tolist(),

@@ -29,6 +29,8 @@ SETTLED = 0.02
 """Share of the final value within which a response is settled"""
 LOW, HIGH = 0.1, 0.9
 """Shares of the final value between which a response rises"""
+NOTHING = 1e-6
+"""Share of the largest deviation, or of a step, below which what remains may be an error of identification: it is 0"""
 NO_VALUE = 1e-9
 """Final value, as a share of the largest, that counts as 0"""
 
@@ -39,12 +41,20 @@ class StepSizes:
 
     rise_time: float | None
     """The time from 10 to 90 % of the final value [s]; None: the final value is 0."""
+    undershoot: float | None
+    """Most that it first goes the wrong way, as a share of the final value [%]; None: the final value is 0."""
     overshoot: float | None
     """Excess over the final value, as a share of it [%]; None: the final value is 0."""
     settling_time: float
     """The time from which on it stays within 2 % of the final value, or of the largest where that is 0 [s]."""
     steady_state: float
     """The final value; 0: it is less than a share of the largest that may be an error."""
+
+    @property
+    def shoots(self) -> list[str]:
+        """Undershoot, where there is one, and overshoot, in words; none where the final value is 0."""
+        sizes = {"undershoot": self.undershoot or None, "overshoot": self.overshoot}
+        return [f"{name} {size:.3g} %" for name, size in sizes.items() if size is not None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,10 +93,10 @@ class Step:
     def verdict(self) -> str:
         """How long the slowest loop takes, and what it takes back."""
         slowest = self.slowest
-        over = "" if slowest.overshoot is None else f", overshoot {slowest.overshoot:.3g} %"
+        shoots = "".join(f", {each}" for each in slowest.shoots)
         settled = f"settles in {quantity(slowest.settling_time, 's')}"
         return (
-            f"a step on {slowest.output} {settled}{over}, {100.0 * slowest.steady_state:.4g} % taken back, "
+            f"a step on {slowest.output} {settled}{shoots}, {100.0 * slowest.steady_state:.4g} % taken back, "
             f"{clock_of(self.dt, self.samples)} (small deviations{of_code(self.in_double)})"
         )
 
@@ -166,9 +176,11 @@ def sizes_of(times: Floats, response: Floats, final: float, *, has_value: bool) 
     largest = float(np.abs(response).max(initial=0.0))
     share = response / final if has_value else response
     outside = np.flatnonzero(np.abs(response - final) > SETTLED * (abs(final) if has_value else largest))
+    wrong_way = max(0.0, -float(share.min()))
     low, high = (int((share >= level).argmax()) for level in (LOW, HIGH)) if has_value else (0, 0)
     return StepSizes(
         rise_time=float(times[high] - times[low]) if has_value else None,
+        undershoot=None if not has_value else 0.0 if wrong_way < NOTHING else 100.0 * wrong_way,
         overshoot=max(0.0, 100.0 * (float(share.max()) - 1.0)) if has_value else None,
         settling_time=float(times[min(outside[-1] + 1, len(times) - 1)]) if len(outside) else 0.0,
         steady_state=final if has_value else 0.0,

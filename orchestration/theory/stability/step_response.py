@@ -27,13 +27,11 @@ from orchestration.theory.stability.known_loops import rested
 from orchestration.theory.stability.linearise import NEAR_ONE, in_isolation
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, whole_at_rest
 from orchestration.theory.stability.period_map import StepMap, step_map
-from orchestration.theory.stability.step import SETTLED, StepSizes, periods_until_left, sizes_of
+from orchestration.theory.stability.step import NOTHING, SETTLED, StepSizes, periods_until_left, sizes_of
 
 if TYPE_CHECKING:
     from orchestration.simulation.figures.style import Figures
 
-NOTHING = 1e-6
-"""Share of the largest deviation, or of a step, below which what remains may be an error of identification: it is 0"""
 WITHIN = f"within {100.0 * SETTLED:.0f} %"
 
 
@@ -83,7 +81,7 @@ class StepResponse(StepSizes):
                 f"final value 0{small}"
             )
         final = quantity(self.steady_state, self.unit, 4)
-        sizes = f"rises in {quantity(self.rise_time, 's')}, overshoot {self.overshoot:.3g} %, settles {WITHIN} in"
+        sizes = f"rises in {quantity(self.rise_time, 's')}, {', '.join(self.shoots)}, settles {WITHIN} in"
         if self.remaining_error is None:
             return f"{step} moves {self.output} to {final}: {sizes} {settled}{small}"
         error = quantity(self.remaining_error, self.unit)

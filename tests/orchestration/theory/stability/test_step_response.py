@@ -11,6 +11,7 @@ import pytest
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
+from orchestration.theory.stability.step import sizes_of
 from quadcosim import StepResponse, UsageError, run, step_response
 from tests.commands import Main
 from tests.examples.common import native_example as example
@@ -64,6 +65,20 @@ def test_what_is_added_to_a_connected_input_is_a_step_of_python_control() -> Non
     assert sent.verdict.startswith("a step of 1 of controller.x moves controller.u by -1.268 1/s after 0 s, and back: ")
 
 
+def test_what_first_goes_the_wrong_way_has_the_undershoot_of_python_control() -> None:
+    """A cart under a pendulum, or any loop with a zero outside the unit circle; rounding is no undershoot."""
+    control = pytest.importorskip("control")
+    system = control.tf([-0.1, 0.15], [1.0, -1.6, 0.65], 1.0)
+    times = np.arange(200.0)
+    response, info = control.step_response(system, times).outputs, control.step_info(system, T=times)
+    for sign in (1.0, -1.0):
+        sizes = sizes_of(times, sign * response, sign * float(system.dcgain()), has_value=True)
+        assert (sizes.undershoot, sizes.overshoot) == pytest.approx((info["Undershoot"], info["Overshoot"]), rel=1e-6)
+        assert sizes.shoots == [f"undershoot {info['Undershoot']:.3g} %", f"overshoot {info['Overshoot']:.3g} %"]
+    rounded = sizes_of(times, np.where(times > 0.0, 1.0, -1e-9), 1.0, has_value=True)
+    assert (rounded.undershoot, rounded.shoots) == (0.0, ["overshoot 0 %"])
+
+
 def test_a_step_of_a_reference_is_that_of_a_run_of_a_linear_loop_of_two_rates(main: Main, tmp_path: Path) -> None:
     """A motor whose current is controlled at five times the rate of its speed, in one code, from rest."""
     motor = system_of("dc_motor")
@@ -86,7 +101,8 @@ def test_a_step_of_a_reference_is_that_of_a_run_of_a_linear_loop_of_two_rates(ma
 
 def test_a_load_that_no_connection_brings_is_led_back() -> None:
     found = step_response(system_of("dc_motor"), to="motor.load", of="motor.speed")
-    assert (found.rise_time, found.overshoot, found.steady_state) == (None, None, 0.0)
+    assert (found.rise_time, found.undershoot, found.overshoot) == (None, None, None)
+    assert found.steady_state == 0.0
     within = np.abs(found.response[found.times >= found.settling_time])
     assert within.max() <= 0.02 * abs(found.peak) < np.abs(found.response).max()
     (axes,) = found.plot()["step"].axes
