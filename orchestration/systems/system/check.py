@@ -65,10 +65,13 @@ def check_parameter(system: System, models: Mapping[str, Model], name: str, para
     value, fed = system.components[name].parameters[parameter], f"{name}.{parameter}"
     is_fed, place = any(fed in x.end for x in system.connections), f"components.{name}.parameters.{parameter}"
     variable = models[name].variables.get(parameter)
-    if variable is not None and variable.kind == "Real" and isinstance(value, str):
-        raise UsageError(f'{place} = {value}: expected a number, or "{OWN_PERIOD}": that of its component')
-    if variable is not None and isinstance(value, OwnPeriod) and variable.unit not in (None, "s"):
-        raise UsageError(f"{place} = {OWN_PERIOD}: expected a number in {variable.unit}; {OWN_PERIOD} is in s")
+    if variable is not None and variable.kind == "Real" and isinstance(value, str | OwnPeriod):
+        written = OWN_PERIOD if isinstance(value, OwnPeriod) else value
+        number = f"{place} = {written}: expected a number{f' in {variable.unit}' if variable.unit else ''}"
+        if variable.unit not in (None, "s"):
+            raise UsageError(number if isinstance(value, str) else f"{number}; {OWN_PERIOD} is in s")
+        if isinstance(value, str):
+            raise UsageError(f'{number}, or "{OWN_PERIOD}": that of its component')
     expect_parameter(place, models[name], parameter, value, is_fed=is_fed)
 
 

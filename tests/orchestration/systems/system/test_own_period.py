@@ -65,7 +65,9 @@ def test_that_of_a_task_is_the_period_of_the_task() -> None:
 @pytest.mark.parametrize(
     ("parameter", "written", "line"),
     [
-        ("period", "sampling.perod", 'sampling.perod: expected a number, or "sampling.period": that of its component'),
+        ("gain", "sampling.perod", 'sampling.perod: expected a number, or "sampling.period": that of its component'),
+        ("period", "5 ms", '5 ms: expected a number in s, or "sampling.period": that of its component'),
+        ("other", "5 kN", "5 kN: expected a number in N"),
         ("other", OWN_PERIOD, "sampling.period: expected a number in N; sampling.period is in s"),
     ],
 )
