@@ -79,7 +79,7 @@ def _certified(request: "Request", of: str, to: float | None, out: Path | None) 
     sequence = "; ".join(" ".join([name, *(f"{x:.6g} s" for x in at)]) for name, at in found.breaking_sequence)
     shown = {
         "of": found.of,
-        "certified": _number(found.certified, unit),
+        "certified": _number(found.certified, unit, ".9g"),
         "breaking": _number(found.breaking, unit),
         "breaking_sequence": sequence or "-",
         "searched": found.searched,
@@ -100,7 +100,7 @@ def _region(request: "Request", of: str, and_of: str, out: Path | None) -> Comma
         inform(str(path))
     document = dataclasses.asdict(found) | {"certificates": written}
     lines = [f"{of} and {and_of}", f"searched           {found.searched}"]
-    lines += [f"certified          {a:.6g} s and {b:.6g} s" for a, b in found.certified]
+    lines += [f"certified          {a:.9g} s and {b:.9g} s" for a, b in found.certified]
     lines += [f"breaking           {a:.6g} s and {b:.6g} s" for a, b in found.breaking]
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
@@ -148,8 +148,8 @@ def _of_hover(request: "Request") -> CommandResult:
     return CommandResult(document=document, verdict=found.verdict, lines=lines)
 
 
-def _number(value: float | None, unit: str) -> str:
-    return "-" if value is None else f"{value:.6g}{unit}"
+def _number(value: float | None, unit: str, form: str = ".6g") -> str:
+    return "-" if value is None else f"{value:{form}}{unit}"
 
 
 @flight_options

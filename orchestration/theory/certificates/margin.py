@@ -15,7 +15,7 @@ from orchestration.foundation.basics.errors import UsageError, told_apart
 from orchestration.foundation.basics.extras import needs
 from orchestration.foundation.basics.terminal import Share, ShareProgress, share_reporter
 from orchestration.foundation.basics.times import NANOSECONDS, floor_to_nanoseconds
-from orchestration.foundation.basics.unit_algebra import quantity
+from orchestration.foundation.basics.unit_algebra import quantity, time_text
 from orchestration.simulation.requests.ranges import paths_in
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.workers.choice import single_run_execution
@@ -96,8 +96,11 @@ class Certified:
     def verdict(self) -> str:
         """How far a quantity may vary with the loop proved stable, and what is known to break it."""
 
-        def shown(value: float) -> str:
-            return f"{value:g} in a row" if self.of.endswith("loss") else quantity(value, "s")
+        def shown(value: float, text: Callable[[float], str] = time_text) -> str:
+            return f"{value:g} in a row" if self.of.endswith("loss") else text(value)
+
+        def rounded(value: float) -> str:
+            return shown(value, lambda value: quantity(value, "s"))
 
         if self.breaking == 0.0:
             return f"unstable even without variation of {self.of}"
@@ -117,10 +120,10 @@ class Certified:
         if self.searched == NOT_SEARCHED:
             broken = "none sought that breaks the loop"
         if self.breaking is not None:
-            broken = f"one of {shown(self.breaking)} breaks the loop"
+            broken = f"one of {rounded(self.breaking)} breaks the loop"
         best = ""
         if self.small_gain is not None and self.small_gain > (self.certified or 0.0):
-            best = f"up to {shown(self.small_gain)} is stable by the small-gain bound, without a certificate; "
+            best = f"up to {rounded(self.small_gain)} is stable by the small-gain bound, without a certificate; "
         return f"{self.of}: {best}{proved}, {broken} (small deviations{of_code(self.in_double)})"
 
     def __post_init__(self) -> None:
@@ -260,7 +263,7 @@ def _of_times(timeline: LoopTimeline, varying: Varying, last: float | None, prog
     beyond = _OPEN_AT_ONCE if largest == possible else ""
     searched = (
         f"draws at either end of each range, sequences that repeat after at most {LONGEST_SEQUENCE}, "
-        f"values up to {largest:g} s"
+        f"values up to {largest:.9g} s"
     )
     if breaking_at(up_to(0.0), 0.0) is not None:
         states = len(up_to(0.0).kept)

@@ -202,6 +202,12 @@ def test_a_small_gain_bound_beyond_what_is_certified_is_in_the_verdict() -> None
     assert "small-gain" not in replace(found, small_gain=0.009).verdict
 
 
+def test_a_proved_value_is_said_to_the_nanosecond() -> None:
+    """A range ends before a period, 20 ms, which is not proved."""
+    found = Certified(of=COMMAND, certified=0.019999999, largest=0.019999999, searched="", states=5)
+    assert "every sequence up to 19.999999 ms is stable, none found up to 19.999999 ms, the most" in found.verdict
+
+
 def test_a_value_of_the_file_beyond_what_is_certified_is_in_the_verdict() -> None:
     found = Certified(of=COMMAND, certified=0.001, largest=0.01, searched="", states=5, own=0.0012)
     less = "every sequence up to 1 ms is stable, less than the file's 1.2 ms, for which nothing is proved"
