@@ -46,6 +46,9 @@ WIDTH = 0.6
 """Width of a character, as a share of its height"""
 CALM = 3.0
 """Settling times of the slowest loop after which the axis of a step ends"""
+BELOW_HALF = 0.995
+"""Share of half the sampling rate up to which a phase is drawn: there L is real, and where it is all but 0 there its
+phase turns in the last pixel"""
 LEAST = 1e-12
 """Least gain that is drawn: less is rounding, as of a slow task beyond half its own rate"""
 
@@ -92,7 +95,8 @@ def bode_figure(results: Sequence[Bode], style: Style = SCREEN) -> Figure:
         phase[np.abs(gain) < LEAST] = np.nan
         name, decibels = signal(output, {}), _decibels(np.abs(gain))
         above.plot(frequencies, decibels, **how)
-        middle.plot(frequencies, phase, **how)
+        below_half = frequencies < BELOW_HALF * frequencies[-1]
+        middle.plot(frequencies[below_half], phase[below_half], **how)
         below.plot(frequencies, _decibels(np.abs(1.0 / (1.0 + gain))), **how)
         if loop is not None:
             margins.append(critical_phase(loop, frequencies, phase) + min(0.0, loop.phase_margin or 0.0))

@@ -269,7 +269,8 @@ def test_an_unstable_loop_has_no_margins_and_no_step() -> None:
     assert "unstable" in gain.get_title()
     rounded = dataclasses.replace(found, gains=np.where(found.frequencies > 30.0, 1e-19, found.gains))
     for axes in rounded.plot()["bode"].axes[:2]:  # what is zero but for rounding is not
-        assert np.array_equal(np.isnan(axes.lines[0].get_ydata()), found.frequencies > 30.0)
+        at, drawn = np.transpose(axes.lines[0].get_xydata())
+        assert np.array_equal(np.isnan(drawn), at > 30.0)
     with pytest.raises(UsageError, match=r"^step: expected a stable loop; the spectral radius of this one is 1\.04"):
         step(late)
 
@@ -404,7 +405,7 @@ def test_the_commands_print_the_margins_first_and_draw(main: Main, tmp_path: Pat
     told = main("step", file, "--native", "--json", "--out", tmp_path)
     assert "left out here: delay_jitter and loss of connections.command; expect includes them" in told.stderr
     stepped = json.loads(told.stdout)
-    assert {"rise_time", "overshoot", "settling_time", "steady_state"} < stepped.keys()
+    assert {"rise_time", "undershoot", "overshoot", "settling_time", "steady_state"} < stepped.keys()
     assert (stepped["times"], stepped["responses"]) == (
         step_of("dc_servo").times.tolist(),
         step_of("dc_servo").responses.tolist(),
@@ -451,6 +452,18 @@ def test_a_phase_margin_is_drawn_from_a_dotted_line(start: float, end: float, cr
     dotted = [float(np.asarray(line.get_ydata())[0]) for line in phase.lines if line.get_linestyle() == ":"]
     assert critical in dotted
     assert phase.get_ylim()[0] < critical
+
+
+def test_a_phase_that_turns_at_half_the_sampling_rate_is_drawn_up_to_there() -> None:
+    """As of a cart under a pendulum: its loop gain, real there, has a zero all but there."""
+    known = bode_of("dc_servo")
+    z = np.exp(1j * known.frequencies * known.dt)
+    turning = dataclasses.replace(known, stable=False, loops=(), gains=np.array([0.01 * (z + 1.0001) / (z - 1.0)]))
+    assert abs(np.diff(turning.phases[0])[-1]) > 80.0
+    _, phase, *_ = turning.plot()["bode"].axes
+    at, drawn = np.transpose(phase.lines[0].get_xydata())
+    assert np.abs(np.diff(drawn)).max() < 2.0
+    assert at[-1] > 0.99 * math.pi / known.dt
 
 
 def test_the_size_of_a_margin_crosses_no_curve_where_the_gain_is_1_beside_a_resonance() -> None:
