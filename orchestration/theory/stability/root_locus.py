@@ -1,6 +1,7 @@
 """The poles of a sampled loop over a quantity, and where they cross the unit circle."""
 
 import math
+import re
 from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
@@ -58,6 +59,8 @@ ON_CIRCLE = 1e-5
 ROUNDING = float(np.finfo(float).tiny)
 DIGITS, FEW = 6, 4
 """Digits of its values in a sentence, at most, and where it is not known how many hold"""
+_NUMBERS = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?( [nµm]?s\b)?")
+"""Numbers in a reason, with their units of time: reasons that differ in them alone are of one kind"""
 
 
 @passable
@@ -148,7 +151,14 @@ class RootLocus:
         first, last = shown(self.values[0]), shown(self.values[-1])
         known = f"(small deviations{of_code(self.in_double)})"
         if self.without:
-            known += f"; no poles at {len(self.without)} of {self.tried} values tried, as {self.without[0]}"
+            kinds = dict[str, list[str]]()
+            for one in self.without:
+                kinds.setdefault(_NUMBERS.sub("", one), []).append(one)
+            reasons = [
+                f"{len(alike)}{'' if k else f' of {self.tried} values tried'}, as {alike[0]}"
+                for k, alike in enumerate(kinds.values())
+            ]
+            known += f"; no poles at {some(reasons, '; at ')}"
         if self.asked is not None:
             known += f"; {self.tried} values tried, at which all rates repeat together"
             known += " after twenty times the longest period at most"

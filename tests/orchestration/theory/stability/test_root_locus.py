@@ -72,6 +72,9 @@ def test_values_without_poles_take_nothing_from_the_others(monkeypatch: pytest.M
         f"{DELAY}: poles inside the unit circle at 0 s, leave at 13.4966 ms, 51.1 rad/s (small deviations); "
         f"no poles at 1 of {found.tried} values tried, as {DELAY} = 0.028: no rest"
     )
+    reasons = ["no rest within 20 ms", "it diverges", "no rest within 1.5 s"]
+    several = dataclasses.replace(found, without=tuple(f"{DELAY} = {k}e-05: {why}" for k, why in enumerate(reasons)))
+    assert f"at 2 of {found.tried} values tried, as {DELAY} = 0e-05: no rest within 20 ms; at 1, as " in several.verdict
     worst, best = 0.013, 0.0145
     found = locus(example("dc_servo"), DELAY, first=0.007, last=0.021, count=3)
     assert (found.values.tolist(), (found.radius < 1.0).tolist()) == ([0.007, 0.021], [True, False])
