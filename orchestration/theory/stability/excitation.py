@@ -252,6 +252,10 @@ class Excitation:
     def _is_followed(self, outputs: Floats, largest: float) -> bool:
         return all(abs((y - rest) / weight) <= largest for y, (rest, weight) in zip(outputs.tolist(), self._around))
 
+    def left(self, outputs: Floats) -> int:
+        """After how many rows, shape (n, outputs), these leave rest farther than they are followed; else n."""
+        return next((k for k, one in enumerate(outputs) if not self._is_followed(one, self.largest)), len(outputs))
+
     def response_to(self, moves: Floats, rung: Rung) -> Floats:
         """The response to deviations of the inputs, shape (n, inputs), each over a rung; shape (n, outputs)."""
         up, down = (self._moved(move * moves, rung) for move in MOVES)

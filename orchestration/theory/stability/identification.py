@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import counted
 from orchestration.theory.stability.excitation import COARSE, FINER, MAX_PULSE, Excitation, Rest, Rung
 from orchestration.theory.stability.lifted_component import LiftedInstance, LiftedTangent, lifted_rest
 from orchestration.theory.stability.linearised_component import EXACT, Tangent
@@ -86,7 +87,7 @@ def of_samples(rest: Rest, period: float) -> SampledRest:
     """
     excitation, sample = Excitation(rest), Rung(1, period)
     count = _choose_pulse(excitation, [sample] * (2 * SAMPLES))
-    samples = _samples_until_alike(excitation, sample)
+    samples = _samples_until_alike(excitation, sample, count)
     return SampledRest(rest=rest, period=period, excitation=excitation, count=count, samples=samples)
 
 
@@ -214,23 +215,34 @@ def _rungs(times: Floats, longest: float, unit: float | None) -> list[Rung]:
     return [Rung(count, float(length) / count) for count, length in zip(counts, lengths)]
 
 
-def _samples_until_alike(excitation: Excitation, sample: Rung) -> int:
+def _samples_until_alike(excitation: Excitation, sample: Rung, count: int) -> int:
     """After how many samples the response to a pulse repeats: more than 1 of a component of several rates.
 
     Raises `UsageError` where it does not repeat within `MOST_SAMPLES`.
     """
-    seen, rest, responses = [sample] * (MOST_SAMPLES + 1), excitation.rest, list[Floats]()
+    rest, responses, rungs, compared = excitation.rest, list[Floats](), MOST_SAMPLES + 1, 2 * MOST_SAMPLES
+    at_rest = excitation.outputs_after(rest, [sample] * (rungs + compared))
+    left = excitation.left(at_rest)
+    if FEW + 1 < left < len(at_rest):  # what grows from where it only nearly rests may come to a limit
+        rungs = min(rungs, max(FEW, min(count, left // 2)))
+        compared = min(compared, left - rungs)
     shares = 1.0 / (1.0 + (GOLDEN * np.arange(len(excitation.held))) % 1.0)  # no two inputs cancel, as their difference
     pulsed = excitation.held + shares * excitation.pulses
-    for _ in range(2 * MOST_SAMPLES):
-        legs = [(pulsed, sample), *((excitation.held, sample) for _ in seen[1:])]
-        responses.append((excitation.course(rest, legs) - excitation.outputs_after(rest, seen)) / excitation.pulse)
+    for k in range(compared):
+        legs = [(pulsed, sample), *((excitation.held, sample) for _ in range(rungs - 1))]
+        responses.append((excitation.course(rest, legs) - at_rest[k : k + rungs]) / excitation.pulse)
         _, rest = excitation.followed(rest, sample)
-    allowed = TURN * max(1.0, max(float(np.abs(each).max(initial=0.0)) for each in responses))
-    for samples in range(1, MOST_SAMPLES + 1):
+    allowed = TURN * max(float(np.abs(each).max(initial=1.0)) for each in responses)
+    for samples in range(1, compared // 2 + 1):
         apart = (np.abs(a - b).max(initial=0.0) for a, b in zip(responses, responses[samples:]))
         if max(apart) <= allowed:
             return samples
+    if left < len(at_rest):
+        raise UsageError(
+            f"{excitation.name}: grows by itself out of the range in which it is linear within "
+            f"{counted(left + 1, 'sample')}, so it is not seen whether its responses to a pulse are "
+            "alike at each: expected a law that grows more slowly"
+        )
     raise UsageError(
         f"{excitation.name}: responds to a pulse differently from sample to sample, and not alike again within "
         f"{MOST_SAMPLES} samples, as code whose slowest task has a longer period"

@@ -423,6 +423,37 @@ def test_poles_far_outside_the_unit_circle_hide_none_inside_it(factor: float) ->
     assert measured.accuracy < 1e-9
 
 
+class Leaving(Growing):
+    """A law that by itself grows from where it only nearly rests into its limit."""
+
+    poles = np.array([-1.8, 0.3, 0.02, 0.5])
+
+    def step(self, t: float, h: float) -> None:
+        self.kept = np.clip(self.poles * self.kept + self.u, -1.0, 1.0)
+
+
+@pytest.mark.parametrize(("away", "growth"), [(1e-11, -1.8), (1e-9, -3.0)])
+def test_a_law_that_leaves_its_rest_for_its_limit_by_itself_has_one_rate_none_the_less(
+    away: float, growth: float
+) -> None:
+    fmu = Leaving()
+    fmu.poles = np.array([growth, *Leaving.poles[1:]])
+    fmu.kept[0] = away
+    begun = of_samples(rest(fmu), 1.0)
+    assert begun.samples == 1
+    poles = np.linalg.eigvals(of_one_rate(begun.tangent()).derivatives(1.0)[0][1:])
+    assert poles[np.abs(poles) > 1.0] == pytest.approx([growth], rel=1e-6)
+
+
+def test_a_law_that_leaves_before_its_samples_are_compared_is_refused_as_that() -> None:
+    fmu = Leaving()
+    fmu.poles, fmu.kept[0] = np.array([-20.0, *Leaving.poles[1:]]), 1e-3
+    with pytest.raises(
+        UsageError, match=r"line: grows by itself out of the range in which it is linear within 1 sample, so"
+    ):
+        of_samples(rest(fmu), 1.0)
+
+
 class Observing(Line):
     """A state feedback of an observer that is fast, and unstable by itself; it rests away from 0."""
 
