@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 from orchestration.components.fmi.read_description import Model
@@ -42,13 +41,10 @@ def local_limits(varied: Varied, span: Range, models: Mapping[str, Model]) -> Li
     """As in `stability`; where the loop has no fixed periods, by exact radii instead of twin runs."""
 
     def examined(at: Callable[[float], System], span: Range) -> LinearLimit | None:
-        fmus = {name: one.fmu for name, one in varied.system.components.items()}
-        loops = Loops({fmus[name]: models[name] for name in fmus})
+        loops = Loops({one.fmu: models[name] for name, one in varied.system.components.items()})
 
         def radius(value: float) -> float:
-            calm = deterministic(at(value))
-            components = {name: replace(one, fmu=fmus[name]) for name, one in calm.components.items()}
-            return loops.radius(replace(calm, components=components), agree=RADIUS_TOLERANCE)
+            return loops.radius(deterministic(at(value)), agree=RADIUS_TOLERANCE)
 
         return by_examined(radius, span)
 

@@ -32,6 +32,7 @@ from orchestration.theory.exact.objectives import ObjectiveMeans
 from orchestration.theory.exact.random_times import ATTOSECONDS, RandomLink, SampledTask, attoseconds, exact_seconds
 from orchestration.theory.exact.timing import by_turns, links_of, sampled_tasks
 from orchestration.theory.exact.timing_chain import TimingChain, costs_until
+from orchestration.theory.stability.in_double import as_it_is
 from orchestration.theory.stability.loop_at_rest import ExtraSignals, KnownTangents, Start, whole_at_rest
 from orchestration.theory.stability.matrices import OF_FIXED_STEP, Components, Continuous, SampledSystem
 from orchestration.theory.stability.periodic_schedule import periodic_schedule
@@ -93,8 +94,9 @@ class Solution:
 class Loops:
     """Linearises and solves systems; those that differ in delays, losses and jitter alone are linearised once.
 
-    Models are by the names of FMUs in systems. What is linearised `nearly` takes components as they were measured in
-    other systems where they still predict a response to one part in a million: in the order of shorter periods.
+    Models are by the names of FMUs in systems, not in double precision. What is linearised `nearly` takes components as
+    they were measured in other systems where they still predict a response to one part in a million: in the order of
+    shorter periods.
     """
 
     def __init__(self, models: Mapping[str, Model], *, simulated: bool = False, nearly: bool = False) -> None:
@@ -128,7 +130,7 @@ class Loops:
 
     def _linearised(self, system: System, initial: System | None) -> Linear:
         noise = _white_noise(system, simulated=self.simulated)
-        models = {name: self._models[component.fmu] for name, component in system.components.items()}
+        models = {name: self._models[as_it_is(component.fmu)] for name, component in system.components.items()}
         objectives, initial_state = ObjectiveMeans(system, models), None
         stepped = [] if initial is None else [end for name in steps_of(initial) for end in initial.sources[name].to]
         extra = ExtraSignals(inputs=(*noise, *stepped), outputs=objectives.outputs)

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from orchestration.components.building import wrap
+from orchestration.systems.system.files import files_of
+from orchestration.theory.exact.loops import Loops
+from orchestration.theory.stability.operating_point import deterministic
 from quadcosim import UsageError, changed, linearise, load_system
 from tests.places import ROOT
 
@@ -84,6 +87,13 @@ def slowest(file: Path, k_i: float) -> float:
 def test_slow_integrals_have_the_poles_of_the_law(tmp_path: Path) -> None:
     file = written(tmp_path)
     assert slowest(file, 1e-5) < 1.0 < slowest(file, -1e-5)
+
+
+def test_a_system_in_double_is_solved_by_the_models_of_its_own_files(tmp_path: Path) -> None:
+    """As its sequences of jobs are, of which one may break the loop."""
+    system = load_system(written(tmp_path))
+    loops = Loops(files_of(system).models)
+    assert loops.radius(deterministic(system), agree=1e-9) == loops.radius(system, agree=1e-9)
 
 
 def test_the_code_is_compiled_once_until_it_changes_and_never_beside_the_users(tmp_path: Path) -> None:
