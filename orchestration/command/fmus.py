@@ -82,7 +82,7 @@ def build(
 
     With --name one slave is built as another FMU, in which parameters fixed by --set and --vehicle are constants.
     """
-    from orchestration.components.building import builder, fmus
+    from orchestration.components.building import builder, fmus, wrap
     from orchestration.components.building.models import MODELS
     from orchestration.quadrotor.scenarios.wiring import DEFAULT_CONTROLLER
 
@@ -105,7 +105,8 @@ def build(
         folder = builder.folder_of(slave)
         consent.agree(folder)
         for path in builder.described_in(folder) if Path(slave).is_dir() else ():
-            inform(f"{path}: describes code in C, which is not built here: quadcosim wrap {path}")
+            if all(wrap.is_out_of_date(wrap.fmu_of(path, version), path) for version in (2, 3)):
+                inform(f"{path}: describes code in C, of which there is no FMU, or an older one: quadcosim wrap {path}")
     with progress_bar("building") as progress:
         how: Any = {"packing": packing, "systems": target, "progress": progress}
         return result_of_files(builder.build_slaves(slaves, out or folder / packing.folder, inform, **how))

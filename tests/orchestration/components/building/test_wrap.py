@@ -477,7 +477,12 @@ def test_beside_slaves_in_python_what_is_c_already_is_named(main: Main, tmp_path
         builder.slaves_named(str(tmp_path / "Moto"))
     done = main("build", tmp_path)
     assert done.stdout.split() == [str(tmp_path / "Motor.fmu")]
-    assert f"{tmp_path}/tasks.toml: describes code in C, which is not built here: quadcosim wrap" in done.stderr
+    assert f"{tmp_path}/tasks.toml: describes code in C, of which there is no FMU, or an older one: quad" in done.stderr
+    (tmp_path / "it.c").write_text("")
+    wrap.locate(tmp_path / "tasks.toml")
+    assert "tasks.toml" not in main("build", tmp_path).stderr
+    (tmp_path / "it.c").write_text("int changed;")
+    assert "tasks.toml: describes code" in main("build", tmp_path).stderr
 
 
 def _output(fmu: Path, inputs: dict[str, float]) -> float:
