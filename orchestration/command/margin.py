@@ -109,17 +109,18 @@ def _checked(path: Path, request: "Request | None") -> CommandResult:
     from orchestration.theory.certificates.check_file import check_certificate
 
     found = check_certificate(path, request)
-    lines = []
+    parts = dict[tuple[str, int | None], list[tuple[tuple[float, float], ...]]]()
     for name, ranges in found.ranges.items():
-        run = found.runs[name]
-        values = " and ".join(f"{low:.9g} to {high:.9g} s" for low, high in ranges)
+        parts.setdefault((name.partition(", ")[0], found.runs[name]), []).append(ranges)
+    lines = []
+    for (name, run), each in parts.items():
+        ends = [(min(low for low, _ in of), max(high for _, high in of)) for of in zip(*each)]
+        values = " and ".join(f"{time_text(low)} to {time_text(high)}" for low, high in ends)
+        values = values if len(each) == 1 else f"{len(each)} parts (each with --json) within {values}"
         often = "any number of times in a row" if run is None else f"at most {run} times in a row"
         lines.append(f"{name:<17}  {', '.join(filter(None, [values, often]))}")
     lines.append(f"{'radius':<17}  {found.radius:g} of the measured one")
-    of = " and ".join(found.of)
-    if found.up_to is not None:
-        lines.append(f"{'so it holds for':<17}  {of} from 0 to {found.up_to:.9g} s")
-    if not of:
+    if not found.of:
         lines.append(f"{'loop':<17}  the matrices in the file; no system was given")
     return CommandResult(document=found, verdict=found.verdict, lines=lines)
 

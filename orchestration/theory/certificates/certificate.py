@@ -13,6 +13,7 @@ import numpy as np
 from orchestration.foundation.basics.documents import read_text
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.theory.certificates.family import Factor, Letter, LoopFamily
 
 FORMAT = "quadcosim certificate 1"
@@ -105,8 +106,9 @@ class Checked:
     @property
     def verdict(self) -> str:
         """What a certificate proves, and about what."""
-        whose = " and ".join(self.of) + " of this system" if self.of else "the matrices in the file"
-        return f"the proof holds: no sequence makes the {self.states} numbers of the loop grow ({whose})"
+        up_to = "" if self.up_to is None else f" from 0 to {time_text(self.up_to)}"
+        whose = f"{' and '.join(self.of)}{up_to} of this system" if self.of else "the matrices in the file"
+        return f"the proof holds for {whose}: no sequence makes the {self.states} numbers of the loop grow"
 
 
 def words(certificate: Certificate, mode: int, length: int) -> Iterator[tuple[int, Word]]:

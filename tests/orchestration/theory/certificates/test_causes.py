@@ -1,5 +1,6 @@
 """Loops that a computer or a network makes late: what is certified of the causes, and what refutes too much."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 import quadcosim
+from orchestration.command import margin as margin_command
 from orchestration.experiments.limits.evaluation import is_good
 from orchestration.foundation.basics.errors import UsageError
+from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.simulation.requests.request import request_of
 from orchestration.systems.system.component import Sampling
 from orchestration.systems.system.computers import Computer, Message, Network, Task
@@ -118,6 +121,13 @@ def test_a_certificate_says_up_to_which_value_it_is_one_of_a_system(found: Certi
     own = check_certificate(path, on_a_computer())
     assert own.of == (LOGGER,)
     assert own.up_to == found.certified
+    assert own.verdict.startswith(
+        f"the proof holds for {LOGGER} from 0 to {time_text(own.up_to or 0.0)} of this system: "
+    )
+    late, *_ = margin_command._checked(path, None).lines
+    assert re.match(
+        rf"late +{len(own.ranges)} parts \(each with --json\) within 0 s to \S+ ms and 0 s to \S+ ms, any", late
+    )
     for other in ({"execution": 0.05}, {"period": 1.01}, {"read": "release"}):
         with pytest.raises(AnotherLoop):
             check_certificate(path, on_a_computer(control=other))

@@ -13,6 +13,7 @@ import pytest
 from orchestration.command.cli import main
 from orchestration.foundation.basics.errors import QuadcosimError, UsageError
 from orchestration.foundation.basics.simulator import Floats
+from orchestration.foundation.basics.unit_algebra import time_text
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
 from orchestration.theory.certificates import margin as certificates
@@ -332,7 +333,8 @@ def test_the_command_writes_what_it_checks(
         document["verdict"],
     )
     text = output_of(capsys, "margin", "--check", path, file, *slow)
-    assert f"late               0 to {document['certified']:.9g} s, any number of times in a row" in text
+    late = f"0 s to {time_text(document['certified'])}, any number of times in a row"
+    assert f"late               {late}" in text
     assert "connections.command.delay_jitter of this system" in text
     assert "no system was given" in output_of(capsys, "margin", "--check", path)
     assert "period of 1 s, the system has 900 ms" in one_line(
