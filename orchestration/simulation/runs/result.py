@@ -20,6 +20,7 @@ from orchestration.simulation.results import display_names as labels
 from orchestration.simulation.results.objectives import Metrics, judged_objective, unmet
 from orchestration.simulation.results.units import ColumnInfo
 from orchestration.systems.system.model import System
+from orchestration.systems.system.placement import placed_tasks
 from orchestration.systems.system.request import Request
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ class Result:
         """How a run ended, by the objective that its criterion judges, and its clock; none of an FMU alone without."""
         from orchestration.systems.system.description import describe_clock
 
-        missed = [f"{name} {count}" for name, count in self.missed_deadlines.items()]
+        missed = [f"{name} {count}{self._never(name)}" for name, count in self.missed_deadlines.items()]
         late = f"; deadlines missed: {some(missed)}" if missed else ""
         components = self.system.components.values()
         has_clock = len(components) > 1 or any(each.sampling is not None for each in components)
@@ -117,11 +118,23 @@ class Result:
         """How many jobs and frames missed their deadlines, by COMPUTER.TASK or NETWORK.MESSAGE that missed any."""
         if not (self.system.computers or self.system.networks):
             return {}
-        missed = Counter[str]()
+        return dict(self._counted("missed").most_common())
+
+    def _counted(self, kind: str) -> Counter[str]:
+        """How many events of a kind there are, by their names."""
+        found = Counter[str]()
         for chunk in self.recording.chunks(("time",)):
-            names, of = chunk.events.names, chunk.events.table[chunk.events.are("missed"), 2]
-            missed.update(names[place] for place in of)
-        return dict(missed.most_common())
+            events = chunk.events
+            places, counts = np.unique(events.table[events.are(kind), 2], return_counts=True)
+            found.update({events.names[place]: int(count) for place, count in zip(places, counts)})
+        return found
+
+    def _never(self, late: str) -> str:
+        """That no job of a late task had any time of its processor, or none was done; empty for any other."""
+        if late not in {f"{each.computer_name}.{each.name}" for each in placed_tasks(self.system.computers)}:
+            return ""
+        without = {"started": " (never ran)", "finished": " (never done)"}
+        return next((text for kind, text in without.items() if not self._counted(kind)[late]), "")
 
     def _ending(self) -> str:
         metrics, units = self.metrics, self.units

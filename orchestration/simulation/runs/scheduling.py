@@ -20,7 +20,7 @@ from orchestration.simulation.requests.request import (
     request_of,
 )
 from orchestration.simulation.runs.arguments import window_within
-from orchestration.systems.computers.timeline import Timeline
+from orchestration.systems.computers.timeline import NEVER, Timeline
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.schedule.responses import Responses, responses_of
 from orchestration.systems.system.request import Request, system_of
@@ -55,6 +55,12 @@ class Scheduled:
         each = {**self.tasks, **self.messages}
         return [name for name, one in each.items() if one.jobs and one.response is None]
 
+    def _never(self, late: str) -> str:
+        """That nothing of a late task or message is done, or no job of it has any time; empty for any other."""
+        jobs = self.timeline.jobs.get(late)
+        never = "never done" if jobs is None or (jobs.started != NEVER).any() else "never ran"
+        return f" ({never})" if late in self.starved else ""
+
     @property
     def verdict(self) -> str:
         """Which deadlines are missed, or how near the worst response comes to one, and what is busiest."""
@@ -65,7 +71,8 @@ class Scheduled:
         until = f"in {quantity(self.until, 's')}"
         if missed := self.missed:
             worst = [
-                f"{name} {100.0 * share:.3g} %" for name, share in sorted(missed.items(), key=lambda item: -item[1])
+                f"{name} {100.0 * share:.3g} %{self._never(name)}"
+                for name, share in sorted(missed.items(), key=lambda item: -item[1])
             ]
             return f"deadlines missed {until}: {some(worst)}{busy}"
         if not due:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from orchestration.foundation.recording.recording import Event
 from orchestration.simulation.engines.backlog import RunEvents
+from orchestration.simulation.runs.scheduling import schedule
 from orchestration.systems.schedule.resources import timeline_of
 from orchestration.systems.system.computers import Computer, Task
 from orchestration.systems.system.model import System
@@ -65,7 +66,9 @@ def test_a_job_released_behind_its_deadline_is_missed_when_it_is_released() -> N
 
 def test_of_a_starved_task_only_jobs_that_are_not_late_yet_are_kept() -> None:
     tasks = {"all": Task(period=0.001, execution=0.001), "none": Task(period=0.001, priority=2)}
-    run_events = RunEvents(System(stop_time=10.0, computers={"one": Computer(tasks=tasks)}))
+    system = System(stop_time=10.0, computers={"one": Computer(tasks=tasks)})
+    assert schedule(system).verdict.startswith("deadlines missed in 10 s: one.none 100 % (never ran); ")
+    run_events = RunEvents(system)
     found = run_events.with_messages(NO_MESSAGES, 9_999_500_000)
     missed = found.table[found.are("missed", "one.none")]
     assert missed[:, 3].tolist() == list(range(9999))
