@@ -321,8 +321,8 @@ function intervalsOf({ x, y }, { x: xs, y: ys, error_y: { array, arrayminus, wid
   return svg("path", { d: d.join(""), fill: "none", stroke: line.color, "stroke-width": 1.2 });
 }
 
-/** Cells as one path for each colour, and their numbers. */
-function cellsOf({ x, y }, { x: across, y: up, z, zmin, zmax, colorscale, colors, xgap, text, faded }) {
+/** Cells as one path for each colour, the frame of the `open` one, [x, y], and their numbers. */
+function cellsOf({ x, y }, { x: across, y: up, z, zmin, zmax, colorscale, colors, xgap, text, faded, open }) {
   const place = (axis, values) => (axis.words ? [...values.keys(), values.length].map((i) => i - 0.5) : edgesOfCells(axis, values)).map((edge) => axis.at[0] + ((edge - axis.ends[0]) / (axis.ends[1] - axis.ends[0])) * (axis.at[1] - axis.at[0]));
   const [xs, ys] = [place(x, across), place(y, up)];
   const gap = xgap ?? 0;
@@ -336,7 +336,10 @@ function cellsOf({ x, y }, { x: across, y: up, z, zmin, zmax, colorscale, colors
     groups.set(key, `${groups.get(key) ?? ""}M${(xs[j] + gap / 2).toFixed(1)} ${(ys[i] - gap / 2).toFixed(1)}H${(xs[j + 1] - gap / 2).toFixed(1)}V${(ys[i + 1] + gap / 2).toFixed(1)}H${(xs[j] + gap / 2).toFixed(1)}Z`);
     if (text?.[i][j]) words.push(svg("text", { x: (xs[j] + xs[j + 1]) / 2, y: (ys[i] + ys[i + 1]) / 2 + 4, "text-anchor": "middle", "font-size": 11, fill: isLight(colorscale, (value - zmin) / (zmax - zmin)) ? "#111" : "#fff" }, text[i][j]));
   }));
-  return [...[...groups].map(([key, d]) => svg("path", { d, fill: JSON.parse(key)[0], opacity: JSON.parse(key)[1] ? 0.25 : null })), ...words];
+  const [i, j] = open ? [up.indexOf(open[1]), across.indexOf(open[0])] : [-1, -1];
+  const frame = (inset, stroke) => svg("rect", { x: xs[j] + inset, y: ys[i + 1] + inset, width: Math.max(0, xs[j + 1] - xs[j] - 2 * inset), height: Math.max(0, ys[i] - ys[i + 1] - 2 * inset), fill: "none", stroke, "stroke-width": 2.5 });
+  const frames = i < 0 || j < 0 ? [] : [frame(1.5, "#000"), frame(4, "#fff")];
+  return [...[...groups].map(([key, d]) => svg("path", { d, fill: JSON.parse(key)[0], opacity: JSON.parse(key)[1] ? 0.25 : null })), ...frames, ...words];
 }
 
 /** Whether a colour is so light that words on it are dark; `share` is its place in the scale. */

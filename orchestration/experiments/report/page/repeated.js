@@ -47,7 +47,7 @@ function drawRepeated() {
   const marked = isDifference ? here.filter((cell) => cell.low > 0 || cell.high < 0) : [];
   const alone = room ? [] : marked;
   const heat = {
-    type: "heatmap", x: columns, y: rows, z: table((cell) => cell.value), zmin: isDifference ? -1 : 0, zmax: 1, xgap: 1,
+    type: "heatmap", x: columns, y: rows, z: table((cell) => cell.value), zmin: isDifference ? -1 : 0, zmax: 1, xgap: 1, open: cells.open && [cells.open.x, cells.open.y],
     colorscale: isDifference ? "Differences" : "Cividis", text: table((cell) => (room ? cell.text + (marked.includes(cell) ? " ●" : "") : "")),
     customdata: table((cell) => here.indexOf(cell)), said: (i, j) => hoverOfRepeated(at(i, j)),
     colorbar: { tickformat: ".0%", title: { text: isDifference ? "difference of the shares" : "share" }, ...(isNarrowMap() ? { orientation: "h" } : {}) },
@@ -60,7 +60,7 @@ function drawRepeated() {
   const holder = byId("map-plot");
   holder.redraw = drawRepeated;
   holder.onpoint = ({ data }) => openRepeated(here[data]);
-  return drawPlot(holder, [heat, dots, chosenRepeated()], layout);
+  return drawPlot(holder, [heat, dots], layout);
 }
 
 function hoverOfRepeated(cell) {
@@ -70,11 +70,6 @@ function hoverOfRepeated(cell) {
 function placeOfRepeated(cell) {
   const [x, y] = [report.repeated.across, report.repeated.up].map((name) => columnsByName.get(name));
   return `${x.label} ${withUnit(cell.x, x.unit)}, ${y.label} ${typeof cell.y === "string" ? cell.y : withUnit(cell.y, y.unit)}`;
-}
-
-function chosenRepeated() {
-  const [x, y] = cells.open ? [cells.open.x, cells.open.y] : [null, null];
-  return { type: "scatter", mode: "markers", x: [x, x], y: [y, y], showlegend: false, marker: { symbol: "square-open", size: [26, 31], color: ["#000", "#fff"], line: { width: [2.5, 2] } } };
 }
 
 function stepOverRepeated(event) {

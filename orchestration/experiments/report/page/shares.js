@@ -138,7 +138,7 @@ function drawCells() {
   const room = byId("map-plot").clientWidth > 42 * values.length + 180;
   const heat = {
     type: "heatmap", x: values, y: rows, z: table((cell) => cell.survives.good / cell.survives.runs), zmin: 0, zmax: 1, colorscale: "Cividis", xgap: 1,
-    text: table((cell) => (room ? String(Math.round((100 * cell.survives.good) / cell.survives.runs)) : "")), 
+    text: table((cell) => (room ? String(Math.round((100 * cell.survives.good) / cell.survives.runs)) : "")), open: here.includes(cells.open) && [cells.open.value, cells.open.controller],
     customdata: table((cell) => cell.number), said: (i, j) => hoverOfCell(at(rows[i], values[j])),
     colorbar: { tickformat: ".0%", title: { text: "share that survives" } },
   };
@@ -149,13 +149,7 @@ function drawCells() {
   const holder = byId("map-plot");
   holder.redraw = drawCells;
   holder.onpoint = ({ data }) => openCell(report.compared.cells.find((cell) => cell.number === data));
-  return drawPlot(holder, [heat, chosenCell()], layout);
-}
-
-function chosenCell() {
-  const cell = cells.open;
-  const [x, y] = cell && cellsHere().includes(cell) ? [cell.value, cell.controller] : [null, null];
-  return { type: "scatter", mode: "markers", x: [x, x], y: [y, y], showlegend: false, marker: { symbol: "square-open", size: [26, 31], color: ["#000", "#fff"], line: { width: [2.5, 2] } } };
+  return drawPlot(holder, [heat], layout);
 }
 
 function stepOverCells(event) {

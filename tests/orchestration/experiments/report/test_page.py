@@ -402,6 +402,10 @@ def test_a_study_of_two_laws_that_repeats_opens_on_their_difference_with_its_see
     wait_for(page, "document.getElementById('cell-title').textContent === 'period 20 ms, loss 0.5'")
     assert "0 of 2 settled: 0 %, 95 % interval 0 % to 65.8 %" in page.inner_text("#cell-text")
     assert {"0/2", "0/1"} <= {*page.locator("#map-plot text").all_text_contents()}
+    box = "(one) => { const { x, y, width, height } = one.getBBox(); return [x, y, x + width, y + height]; }"
+    left, top, right, bottom = page.locator("#map-plot rect[stroke='#fff']").evaluate(box)
+    numbers = [each.evaluate(box) for each in page.locator("#map-plot text", has_text="0/2").all()]
+    assert any(left < a and top < b and c < right and d < bottom for a, b, c, d in numbers)  # its frame is around it
     page.close()
     page = show(report(swept, swept, out=tmp_path, flights=0))
     marks = page.evaluate("document.getElementById('cell-plot').data.map((one) => [one.name, one.marker.symbol])")
