@@ -222,7 +222,12 @@ class Source:
         given = [kind for kind in kinds if getattr(self, kind) is not None]
         if given in (["file", "trajectory"], ["signal", "trajectory"]):
             given.pop()
-        require(len(given) == 1, "source", " and ".join(given) or "nothing", f"one of {', '.join(kinds)}")
+        require(len(given) > 0, kinds[0], "none", f"it, or one of {', '.join(kinds[1:])}")
+        if len(given) > 1:
+            first, other = sorted(given, key=lambda kind: kind == "noise")[:2]
+            apart = "; noise on top is a source of its own, to an input that the FMU adds" if other == "noise" else ""
+            one = f"none beside {first}: a source has one of {', '.join(kinds)}{apart}"
+            require(False, other, getattr(self, other), one)
         if self.noise is not None:
             require_not_negative(self, "noise")
             require(self.period is not None, "period", "none", "how long each value is held, in seconds")

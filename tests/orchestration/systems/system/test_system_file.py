@@ -91,7 +91,13 @@ def refusal(folder: Path, text: str) -> str:
         (
             "noise = 0.1\n",
             "",
-            "sources.rain.source = nothing: expected one of constant, file, noise, signal, trajectory",
+            "sources.rain.constant = none: expected it, or one of file, noise, signal, trajectory",
+        ),
+        (
+            "noise = 0.1\n",
+            "noise = 0.1\nconstant = 1.0\n",
+            "sources.rain.noise = 0.1: expected none beside constant: a source has one of constant, file, noise, "
+            "signal, trajectory; noise on top is a source of its own, to an input that the FMU adds",
         ),
         ('"max(tank.level)"', '"max(tank.level"', "objectives.peak: "),
         ('"peak < 2.5"', '"open(1)"', "criterion.good: "),
