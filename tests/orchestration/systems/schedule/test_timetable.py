@@ -107,7 +107,7 @@ def test_posted_messages_go_out_and_arrive_by_their_senders_and_then_in_the_orde
 @pytest.mark.parametrize("place", ["components.a.step", "sources.wind.period"])
 def test_a_time_beyond_the_limit_is_rejected_by_name(place):
     plain = system({"a": continuous(0.1)}, sources={"wind": Source(noise=1.0, period=0.1, to=("a.u",))})
-    with pytest.raises(UsageError, match=rf"^{place} = 1e\+300 s: expected less than 1.153e\+09 s$"):
+    with pytest.raises(UsageError, match=rf"^{place} = 1e\+300 s: expected less than 1\.15292e\+09 s$"):
         instants(changed(plain, {place: 1e300}))
 
 
@@ -164,7 +164,7 @@ def test_times_up_to_the_longest_are_exact():
     longest = (MAX_TIME - 10**6) / 10**9
     found = instants(loop(sampled(longest, offset=longest), command={"delay": longest, "delay_jitter": longest}))
     assert len(found) == 11
-    with pytest.raises(UsageError, match=r"connections\.command\.delay = 2e\+09 s: expected less than 1.153e\+09 s"):
+    with pytest.raises(UsageError, match=r"connections\.command\.delay = 2e\+09 s: expected less than 1\.15292e\+09 s"):
         instants(loop(sampled(), command={"delay": 2e9}))
 
 
