@@ -9,6 +9,9 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, replace
 
+import numpy as np
+
+from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.times import NANOSECONDS
 from orchestration.theory.stability.excitation import STANDS_OUT
 from orchestration.theory.stability.in_double import are_in_double, of_code
@@ -19,6 +22,7 @@ from orchestration.theory.stability.matrices import (
     INEXACT,
     Continuous,
     SampledSystem,
+    continuous,
     depends_on_step,
     in_continuous_time,
     turns_of,
@@ -31,6 +35,8 @@ SAME = 1e-9
 of 2 h to two of h; more where rounding of its coordinates decides"""
 ROUNDING = 1e-11
 """Least effect of rounding on a result, as a share of a response"""
+DRAWS = 3
+"""Drawn errors by which it is seen what those of a measurement do"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,9 +48,8 @@ class IdentifiedComponent:
     """it is identified"""
     accuracy: float
     """Accuracy of its responses, relative"""
-    precision: float
-    """Accuracy of each sample, whose errors add up, of a component whose coordinates are nearly dependent; 0 of
-    others"""
+    others: tuple[Continuous | SampledSystem, ...]
+    """The component as other measurements may show it: with errors as large as those of its own"""
     tangent: Tangent
     """whose coordinates its state has, of several rates that before all samples"""
 
@@ -64,7 +69,9 @@ class ComponentIdentifier:
                 self._known[key] = _identified(loop, name)
             known = self._known[key]
             if isinstance(known.part, SampledSystem):
-                known = replace(known, part=known.part.turned(-loop.taken(name)))
+                begun = -loop.taken(name)
+                others = [one.turned(begun) for one in known.others if isinstance(one, SampledSystem)]
+                known = replace(known, part=known.part.turned(begun), others=tuple(others))
             found[name] = known
         return found
 
@@ -89,7 +96,8 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
     component, step = loop.simulation.system.components[name], _informative_step(loop, name)
     found = loop.tangent(name)
     tangent = found.whole if isinstance(found, LiftedTangent) else found
-    accuracy, differs, precision = tangent.accuracy, max(SAME, min(tangent.rounding, INEXACT)), 0.0
+    accuracy, differs = tangent.accuracy, max(SAME, min(tangent.rounding, INEXACT))
+    error = max(ROUNDING, tangent.rounding)
     part: Continuous | SampledSystem
     if component.sampling is not None:
         part = _sampled(found, step)
@@ -98,13 +106,42 @@ def _identified(loop: AtRest, name: str) -> IdentifiedComponent:
         matrices = in_continuous_time(tangent, step, differs if accuracy <= SAME else INEXACT, component.step, most)
         part = replace(matrices, step=tangent.derivatives)
         if accuracy > SAME or matrices.misfit > differs:
-            accuracy, precision = max(accuracy, matrices.misfit), matrices.misfit
-        elif differs > SAME:
-            precision = tangent.rounding
-    method = "saved states, to rounding" if accuracy <= SAME else "saved states, by differences"
+            accuracy = max(accuracy, matrices.misfit)
+        if matrices.unfit is None:
+            error = max(error, matrices.misfit)
+    is_exact = accuracy <= SAME and error <= SAME
+    method = "saved states, to rounding" if is_exact else "saved states, by differences"
     method += of_code(are_in_double({name: component}))
     accuracy = max(ROUNDING, accuracy)
-    return IdentifiedComponent(part=part, method=method, accuracy=accuracy, precision=precision, tangent=tangent)
+    rng = np.random.default_rng(0)
+    others = tuple(_otherwise(part, tangent, error, rng) for _ in range(DRAWS))
+    return IdentifiedComponent(part=part, method=method, accuracy=accuracy, others=others, tangent=tangent)
+
+
+def _otherwise(
+    part: Continuous | SampledSystem, tangent: Tangent, error: float, rng: np.random.Generator
+) -> Continuous | SampledSystem:
+    """A component with errors drawn, as they are distributed in its measurement, the largest at least an `error`."""
+    if isinstance(part, SampledSystem):
+
+        def near(M: Floats) -> Floats:
+            return M + error * M * rng.standard_normal(M.shape)
+
+        first, *later = (
+            replace(turn, A=near(turn.A), B=near(turn.B), C=near(turn.C), D=near(turn.D)) for turn in part.turns
+        )
+        return SampledSystem(**vars(first), later=tuple(later), depends_on_step=part.depends_on_step)
+    largest = float(tangent.noise[0].max(initial=0.0))
+    by_coordinates, by_inputs = (
+        (max(1.0, error / largest) * noise if largest else error * np.abs(M)) * rng.standard_normal(M.shape)
+        for M, noise in zip(tangent.derivatives(part.length), tangent.noise)
+    )
+
+    def stepped(h: float) -> tuple[Floats, Floats]:
+        by_state, by_input = tangent.derivatives(h)
+        return by_state + by_coordinates, by_input + by_inputs
+
+    return replace(continuous(tangent, stepped(part.length), part.length), step=stepped)
 
 
 def _sampled(tangent: Tangent | LiftedTangent, period: float) -> SampledSystem:

@@ -38,8 +38,8 @@ class Expected:
     """Likewise of fourth moments; from 1 on no Monte-Carlo interval of a mean square means anything. None: too many to
     compute."""
     accuracy: float
-    """Accuracy of the results, relative: the change by the last refinement, and the accuracy of the components.
-    Errors of those whose coordinates are nearly dependent add up over the hyperperiods that a loop remembers."""
+    """Accuracy of the results, relative: the change by the last refinement, and what errors of the components, as large
+    as in their measurement, do to the costs."""
     method: str
     """Method by which the components were identified, and by which the result was computed."""
     period: float
@@ -92,12 +92,15 @@ def expect(request: RequestLike, *, as_simulated: bool = False, horizon: float |
 
 
 def expected_of(system: System, loops: Loops, horizon: float | None = None, flown: bool = False) -> Expected:
-    """As `expect`, of a system whose FMUs are loaded in this process; in doubt only if it is to be `flown`."""
-    solution = loops.solve(system)
+    """As `expect`, of a system whose FMUs are loaded in this process.
+
+    In doubt, and of an accuracy by what errors of its components do, only if it is to be `flown`.
+    """
+    solution = loops.solve(system, judged=flown and horizon is None)
     linear, loop, means = solution.linear, solution.loop.result, solution.means
     converged: Converged[Any] = solution.loop
     if horizon is not None:
-        converged = loops.solve_to(system, horizon)
+        converged = loops.solve_to(system, horizon, judged=flown)
         means = converged.result
     if means is None:
         why = f"the mean-square radius is {told_apart(loop.radius, 1.0)[0]}: the mean has no finite expectation"
@@ -108,12 +111,10 @@ def expected_of(system: System, loops: Loops, horizon: float | None = None, flow
     reasons = {name: reasons[name] for name in system.objectives if name in reasons}
     if loop.fourth_moment_radius is None:
         reasons["fourth_moment_radius"] = "too many fourth moments to compute"
-    remembered = 1.0 / (1.0 - loop.radius) if loop.radius < 1.0 else 1.0
-    of_components = max(linear.accuracy, linear.precision * remembered)
     return Expected(
         objectives=values, reasons=reasons,
         mean_square_radius=loop.radius, fourth_moment_radius=loop.fourth_moment_radius,
-        accuracy=converged.difference + of_components, period=solution.loop.period,
+        accuracy=converged.difference + max(linear.accuracy, converged.sensitivity), period=solution.loop.period,
         method=_method(linear.methods, converged.order, system, simulated=loops.simulated, horizon=horizon),
         horizon=horizon,
         doubt=doubt(system, linear.objectives, means, linear.start, loops.instances, horizon) if flown and means else ""

@@ -3,7 +3,7 @@
 import itertools
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, TypeVar
@@ -44,6 +44,8 @@ ORDERS = (1, 2, 4, 8, 16, 32)
 """Orders of Gauss's rule, tried in turn until the next one changes nothing"""
 ORDER_TOLERANCE = 1e-10
 """Difference of a result allowed from order to order"""
+SURE = 4.0
+"""Factor on the root mean square of a few drawn changes of a cost, which no further one may exceed"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +57,8 @@ class Linear:
     """Methods by which each is identified"""
     accuracy: float
     """Accuracy of the responses of the least accurately identified one, relative"""
-    precision: float
-    """Accuracy of each sample of those whose coordinates are nearly dependent; 0: there are none"""
+    others: Sequence[Components]
+    """The components as other measurements may show them"""
     objectives: ObjectiveMeans
     noise: Mapping[str, float]
     """the intensities of white noise, by input"""
@@ -77,6 +79,8 @@ class Converged(Generic[T]):
     """Period [s]"""
     difference: float
     """change by the last doubling of the nodes, relative, and the error of the initial state"""
+    sensitivity: float = 0.0
+    """Change of costs by errors of the components, relative; 0: not asked for"""
     order: int | None
     """Order of Gauss's rule; None: all random times are enumerated"""
 
@@ -151,7 +155,7 @@ class Loops:
                 initial_state = initial_state_of(initial, loop, parts, tangents, means, self.instances)
         methods = {name: one.method for name, one in known.items()}
         accuracy = max((one.accuracy for one in known.values()), default=0.0)
-        precision = max((one.precision for one in known.values()), default=0.0)
+        others = [dict(zip(known, each)) for each in zip(*(one.others for one in known.values()))]
         for name, part in parts.items():
             if isinstance(part, Continuous) and part.unfit is not None and not self.simulated:
                 raise UsageError(
@@ -160,7 +164,7 @@ class Loops:
                     "higher order"
                 )
         return Linear(
-            parts=parts, methods=methods, accuracy=accuracy, precision=precision, objectives=objectives, noise=noise,
+            parts=parts, methods=methods, accuracy=accuracy, others=others, objectives=objectives, noise=noise,
             start=at_rest.start, initial=initial_state,
         )  # fmt: skip
 
@@ -180,8 +184,11 @@ class Loops:
         effects = self._effects(system, linear, ())
         return self._refined(self._tasks_and_links(system, linear, effects), effects, answer, agree).result
 
-    def solve(self, system: System) -> Solution:
-        """Solve a system by finer and finer rules, until they agree; raises `UsageError` where it is too large."""
+    def solve(self, system: System, *, judged: bool = False) -> Solution:
+        """Solve a system by finer and finer rules, until they agree; raises `UsageError` where it is too large.
+
+        How errors of the components change costs is computed where they are `judged`.
+        """
         system = at_operating_point(system)
         linear = self.linear(system)
         used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q)]
@@ -192,17 +199,25 @@ class Loops:
             return loop, np.array([loop.radius, *costs])
 
         effects = self._effects(system, linear, used)
-        converged = self._refined(self._tasks_and_links(system, linear, effects), effects, answer, ORDER_TOLERANCE)
+        timing = self._tasks_and_links(system, linear, effects)
+        converged = self._refined(timing, effects, answer, ORDER_TOLERANCE)
+        if judged and used and converged.result.radius < 1.0:
+            others = [self._effects(system, replace(linear, parts=parts), used) for parts in linear.others]
+            converged = _with_sensitivity(converged, timing, others, lambda chain: answer(chain)[1][1:])
         costs = converged.numbers[1:].tolist()
         means = _with_costs(linear, used, costs) if converged.result.radius < 1.0 else None
         return Solution(linear=linear, loop=converged, means=means)
 
-    def solve_to(self, system: System, horizon: float) -> Converged[Mapping[Call, float]]:
+    def solve_to(self, system: System, horizon: float, *, judged: bool = False) -> Converged[Mapping[Call, float]]:
         """The means of a system from its initial state to `horizon` [s], as `solve`."""
         rests = at_operating_point(system)
         linear = self.linear(rests, initial=replace(system, stop_time=horizon))
         used = [call for call, mean in linear.objectives.means.items() if np.any(mean.Q) or np.any(mean.g)]
-        effects = self._effects(rests, linear, used, with_means=True, steps=steps_of(system))
+
+        def effects_of(parts: Components) -> LoopEffects:
+            return self._effects(rests, replace(linear, parts=parts), used, with_means=True, steps=steps_of(system))
+
+        effects = effects_of(linear.parts)
         assert linear.initial is not None
         start, constant = effects.initial_vector(linear.initial), effects.places("constant", "").start
         end = attoseconds(exact_seconds(horizon))
@@ -213,6 +228,8 @@ class Loops:
 
         timing = self._tasks_and_links(rests, linear, effects, horizon)
         found = self._refined(timing, effects, answer, ORDER_TOLERANCE)
+        if judged and used:
+            found = _with_sensitivity(found, timing, map(effects_of, linear.others), lambda chain: answer(chain)[1])
         return replace(found, difference=found.difference + linear.initial.accuracy)
 
     def _refined(
@@ -281,6 +298,21 @@ class Loops:
         if self.simulated:
             expect_rows(system, tasks, links)
         return tasks, links
+
+
+def _with_sensitivity(
+    found: Converged[T],
+    timing: tuple[Sequence[SampledTask], Sequence[RandomLink]],
+    others: Iterable[LoopEffects],
+    costs_of: Callable[[TimingChain], Floats],
+) -> Converged[T]:
+    """A result with the change of its costs, the last of its numbers, by components as other measurements show them."""
+    tasks, links = timing
+    order, apart = found.order or ORDERS[0], list[float]()
+    for each in others:
+        costs = costs_of(TimingChain(tasks, links, each, order=order, grids=each.grids))
+        apart.append(_relative_difference(costs, found.numbers[-len(costs) :]) if np.isfinite(costs).all() else 1.0)
+    return replace(found, sensitivity=min(1.0, SURE * math.sqrt(np.mean(np.square(apart)))))
 
 
 def _with_costs(linear: Linear, used: Sequence[Call], costs: Sequence[float]) -> dict[Call, float]:

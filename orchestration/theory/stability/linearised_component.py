@@ -91,7 +91,9 @@ class Tangent(LinearSimulator):
         self.unit, self._excitation, self.ladder = unit, excitation, list(ladder)
         self._fewest, self._most, self._points = fewest, most, min(points, len(self.ladder))
         self._known: dict[int, tuple[Floats, Floats]] = {}
-        self.accuracy = self._measured = 0.0
+        self.accuracy = 0.0
+        self.noise = np.zeros((len(self.outputs), 0)), np.zeros((len(self.outputs), len(self.inputs)))
+        """Errors of the derivatives, by coordinates and by inputs, as two sizes of pulses differ"""
         self._find_coordinates(excitation.errors_over(ladder), fewest)
         self.state = np.zeros(len(self._inverse))
 
@@ -106,7 +108,10 @@ class Tangent(LinearSimulator):
 
         By nearly dependent coordinates, or of small responses beside the values at rest: as two sizes of pulses differ.
         """
-        return max(self._measured, ROUNDED * float(np.linalg.cond(self._inverse))) if len(self._inverse) else 0.0
+        if not len(self._inverse):
+            return 0.0
+        measured = float(self.noise[0][len(self.outputs) :].max())
+        return max(measured, ROUNDED * float(np.linalg.cond(self._inverse)))
 
     def step(self, t: float, h: float) -> None:
         """As `Simulator`; the same at any time."""
@@ -356,9 +361,11 @@ class Tangent(LinearSimulator):
             )
         self._produced = [produced[k] for k in chosen]
         self._inverse = np.linalg.inv(self._axes.T @ np.column_stack([columns[k] for k in chosen]))
-        seen = np.column_stack([noise[k] for k in chosen])
-        spread = (self._axes.T**2 @ np.where(np.isfinite(seen), seen, 0.0) ** 2) @ self._inverse**2
-        self._measured = float(np.sqrt(spread).max())
+        seen = np.column_stack(noise) ** 2
+        seen[~np.isfinite(seen)] = 0.0
+        spread = np.vstack([seen[: len(self.outputs)] * excitation.weight[:, None] ** 2, self._axes.T**2 @ seen])
+        moved = np.sqrt(spread[:, : len(self.inputs)]) / excitation.scale
+        self.noise = np.sqrt(spread[:, chosen] @ self._inverse**2), moved
 
     def _growth(self, i: int) -> float:
         """The factor by which the response to a pulse on an input grows in a step, at most."""

@@ -62,6 +62,8 @@ class Continuous(Matrices):
     """the step of the simulated component, where that differs from the matrices"""
     misfit: float = 0.0
     """Difference of the state after a step of 2 h to that after two of h, relative"""
+    length: float = 0.0
+    """Length of the step of whose derivatives they are the logarithm [s]"""
     unfit: str | None = None
     """why the matrices do not describe the component; None: they do"""
 
@@ -167,27 +169,28 @@ def in_continuous_time(
     relative, shorter ones are tried down to its `own`, with which it is simulated; default: `first`. The matrices are
     unfit where these differ by more than `most`, too.
     """
-    count = len(tangent.outputs)
     h = first if tangent.unit is not None else _informative_step(tangent, first)
     shortest = first if own is None else min(own, first)
     while (differs_by := misfit(tangent, h)) > differs and h > shortest:
         h = max(whole_nanoseconds(0.5 * h), shortest)
-    by_state, by_input = tangent.derivatives(h)
+    unfit = f"a step of {2 * h:g} s differs from two of {h:g} s by {differs_by:.1g}" if differs_by > most else None
+    return replace(continuous(tangent, tangent.derivatives(h), h, unfit), misfit=differs_by)
+
+
+def continuous(tangent: Tangent, derivatives: tuple[Floats, Floats], h: float, unfit: str | None = None) -> Continuous:
+    """The matrices of a component in continuous time, by the derivatives of its step of `h` [s]."""
+    count, (by_state, by_input) = len(tangent.outputs), derivatives
     state, moved = by_state[count:], by_input[count:]
-    change, unfit = state - np.eye(len(state)), None
+    change = state - np.eye(len(state))
     if len(change) and np.linalg.norm(change, 2) > 2.0 * FAR:
         unfit = f"a step of {h:g} s is too long to show what happens within it"
         A, B, C, D = np.zeros_like(change), np.zeros_like(moved), by_state[:count], by_input[:count]
     else:
-        if differs_by > most:
-            unfit = f"a step of {2 * h:g} s differs from two of {h:g} s by {differs_by:.1g}"
         A = _logarithm(change) / h
         B = np.asarray(np.linalg.solve(_mean_exponential(A * h), moved)) / h
         C = by_state[:count] @ np.linalg.inv(state)
         D = _feedthrough(by_input[:count], C, moved)
-    return Continuous(
-        inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D, misfit=differs_by, unfit=unfit
-    )
+    return Continuous(inputs=tangent.inputs, outputs=tangent.outputs, A=A, B=B, C=C, D=D, length=h, unfit=unfit)
 
 
 def misfit(tangent: Tangent, h: float) -> float:

@@ -32,7 +32,7 @@ from orchestration.theory.certificates.margin import linear_loop_of
 from orchestration.theory.exact import flown, mean_square, moments
 from orchestration.theory.exact.as_simulated import expect_rows
 from orchestration.theory.exact.expect import Expected, expect, expected_of
-from orchestration.theory.exact.loops import Loops, expect_same_steps
+from orchestration.theory.exact.loops import SURE, Converged, Loops, expect_same_steps
 from orchestration.theory.exact.mean_square import NO_EXPECTATION, NO_VARIANCE, MeanSquares
 from orchestration.theory.exact.objectives import has_mean_of_squares, means_of
 from orchestration.theory.exact.random_times import CERTAIN, RandomLink, RandomTime, SampledTask, exact_seconds
@@ -61,20 +61,33 @@ def test_minimum_variance_control_costs_what_theory_says_through_its_fmus() -> N
     assert not found.reasons
 
 
-def test_of_one_system_after_the_other_only_components_that_change_are_measured_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_of_one_system_after_the_other_only_components_that_change_are_measured_again() -> None:
     one, other = (example("distributed_servo", {"components.controller.parameters.K": K}) for K in (1.5, 1.0))
     loops = Loops(files_of(one).models)
     first, second = loops.linear(one).parts, loops.linear(other).parts
     assert second["servo"] is first["servo"]
     assert pytest.approx(first["controller"].D / 1.5, rel=1e-9) == second["controller"].D
     assert expected_of(other, loops).objectives == pytest.approx(expect(other).objectives, rel=1e-12)
-    single = dataclasses.replace(loops.linear(other), precision=1e-6)
-    monkeypatch.setattr(loops, "linear", lambda system: single)
-    found = expected_of(other, loops)  # errors of each period add up
-    assert found.accuracy == pytest.approx(1e-6 / (1.0 - found.mean_square_radius), rel=0.01)
-    assert found.accuracy > 1.5e-6
+
+
+def test_costs_are_as_accurate_as_those_of_components_with_the_errors_of_their_measurement(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    system = example("distributed_servo", {"components.controller.parameters.K": 1.0})
+    loops = Loops(files_of(system).models)
+    linear = loops.linear(system)
+    near = {**linear.parts, "servo": dataclasses.replace(linear.parts["servo"], A=linear.parts["servo"].A * 1.000001)}
+
+    def solved(**changed: Any) -> Converged[Any]:
+        monkeypatch.setattr(loops, "linear", lambda system: dataclasses.replace(linear, **changed))
+        return loops.solve(system, judged=True).loop
+
+    measured, other = solved(others=[near, near]), solved(parts=near, others=[near])
+    change = np.abs(other.numbers[1:] / measured.numbers[1:] - 1.0).max()
+    assert change > 1e-7
+    assert (measured.sensitivity, other.sensitivity) == (pytest.approx(SURE * change), 0.0)
+    unstable = dataclasses.replace(linear.parts["servo"], B=linear.parts["servo"].B * 100.0)
+    assert solved(others=[{**linear.parts, "servo": unstable}]).sensitivity == 1.0
 
 
 def test_with_a_uniform_delay_through_its_fmus_too() -> None:
