@@ -118,15 +118,17 @@ class Result:
         """How many jobs and frames missed their deadlines, by COMPUTER.TASK or NETWORK.MESSAGE that missed any."""
         if not (self.system.computers or self.system.networks):
             return {}
-        return dict(self._counted("missed").most_common())
+        return dict(self._counted["missed"].most_common())
 
-    def _counted(self, kind: str) -> Counter[str]:
-        """How many events of a kind there are, by their names."""
-        found = Counter[str]()
+    @cached_property
+    def _counted(self) -> dict[str, Counter[str]]:
+        """Numbers of events of some kinds, by kind and name, in one pass."""
+        found = {kind: Counter[str]() for kind in ("missed", "started", "finished")}
         for chunk in self.recording.chunks(("time",)):
             events = chunk.events
-            places, counts = np.unique(events.table[events.are(kind), 2], return_counts=True)
-            found.update({events.names[place]: int(count) for place, count in zip(places, counts)})
+            for kind, counter in found.items():
+                places, counts = np.unique(events.table[events.are(kind), 2], return_counts=True)
+                counter.update({events.names[place]: int(count) for place, count in zip(places, counts)})
         return found
 
     def _never(self, late: str) -> str:
@@ -134,7 +136,7 @@ class Result:
         if late not in {f"{each.computer_name}.{each.name}" for each in placed_tasks(self.system.computers)}:
             return ""
         without = {"started": " (never ran)", "finished": " (never done)"}
-        return next((text for kind, text in without.items() if not self._counted(kind)[late]), "")
+        return next((text for kind, text in without.items() if not self._counted[kind][late]), "")
 
     def _ending(self) -> str:
         metrics, units = self.metrics, self.units
