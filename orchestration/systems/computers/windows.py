@@ -60,8 +60,8 @@ class Window:
 def windows_of(system: System) -> dict[str, Window]:
     """The windows of the components that run on a computer or send over a network, by component.
 
-    Raises `UsageError` where there is no bound, where a job or frame may still be under way when the next one comes,
-    and for what is neither a periodic task nor sent by a sampled component.
+    Messages that sample a component in continuous time have their own, by their places. Raises `UsageError` where there
+    is no bound, where a job or frame may still be under way when the next one comes, and for a task without a period.
     """
     tasks, messages, bounds = tasks_of(system), messages_by_connection(system), bounds_of(system)
     found = {}
@@ -69,8 +69,11 @@ def windows_of(system: System) -> dict[str, Window]:
         sent = [x.name for x in system.connections if x.sender == name]
         over = [messages[each] for each in sent if each in messages]
         sampling, task = component.sampling, tasks.get(name)
-        if sampling is None and over:
-            raise UsageError(f"{over[0].place}: expected messages of a sampled component, which {name} is not")
+        if sampling is None:
+            for each in over:
+                late = nanoseconds(highest(each.message.jitter))
+                found[each.place] = _with_frame(_of_clock(late), each, bounds)
+            continue
         if isinstance(sampling, SamplingOnArrival) or (task is not None and task.task.on is not None):
             raise UsageError(f"{name} runs when a message arrives; expected a component with a period")
         if len(sent) > 1 and over:
@@ -78,13 +81,15 @@ def windows_of(system: System) -> dict[str, Window]:
         if task is not None:
             found[name] = _of_task(task, bounds)
         elif over and sampling is not None:
-            found[name] = Window(
-                earliest=0, latest=nanoseconds(highest(sampling.jitter)), at_deadline=False, least=0, most=0,
-                end=nanoseconds(highest(sampling.jitter)),
-            )  # fmt: skip
+            found[name] = _of_clock(nanoseconds(highest(sampling.jitter)))
         if over:
             found[name] = _with_frame(found[name], over[0], bounds)
     return found
+
+
+def _of_clock(late: int) -> Window:
+    """The window of samples that are up to that late, and sent at once."""
+    return Window(earliest=0, latest=late, at_deadline=False, least=0, most=0, end=late)
 
 
 def _of_task(of: PlacedTask, bounds: Bounds) -> Window:

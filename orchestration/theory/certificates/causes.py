@@ -4,22 +4,28 @@ Whatever the execution times are, a component samples within a window after its 
 within another. A loop that no sequence of draws from these windows makes unstable is stable on that computer.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from orchestration.foundation.basics.bisection import bisected
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.foundation.basics.times import NANOSECONDS, exact_nanoseconds, floor_to_nanoseconds
 from orchestration.systems.computers.windows import Window, windows_of
+from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.connection import Connection
 from orchestration.systems.system.distribution import Distribution, lowest
 from orchestration.systems.system.distribution import Varying as Delay
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed
-from orchestration.systems.system.placement import placed_messages, placed_tasks
+from orchestration.systems.system.placement import messages_by_connection, placed_messages, placed_tasks
 from orchestration.theory.certificates.breaking import FINE
-from orchestration.theory.certificates.certified_loop import JITTER, LATENCY, SHIFT, CertifiedLoop, Draws, Varying
+from orchestration.theory.certificates.certified_loop import JITTER, LATENCY, SHIFT, CertifiedLoop, Varying
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
+from orchestration.theory.stability.matrices import SampledSystem
 
 EXECUTION = "execution"
 
@@ -50,6 +56,34 @@ def cause_at(system: System, path: str) -> Cause | None:
     return None
 
 
+def sampled_by_networks(loop: CertifiedLoop, system: System) -> CertifiedLoop:
+    """A loop with what networks sample of components in continuous time as sampled components that send it on."""
+    components, parts, connections = dict(loop.system.components), dict(loop.components), list[Connection]()
+    over = messages_by_connection(system)
+    for x in loop.system.connections:
+        if x.name not in over or loop.is_sampled(x.sender):
+            connections.append(x)
+            continue
+        place, message = _in_one(over[x.name].place), over[x.name].message
+        assert message.period is not None
+        components[place] = Component(fmu="", sampling=Sampling(period=message.period, offset=message.offset))
+        names = tuple(map(str, range(len(x.start))))
+        nothing, copy = np.zeros((0, 0)), np.eye(len(names))
+        parts[place] = SampledSystem(
+            inputs=names, outputs=names, A=nothing, B=np.zeros((0, len(names))), C=np.zeros((len(names), 0)), D=copy
+        )
+        ends = tuple(f"{place}.{name}" for name in names)
+        connections += [Connection(name=place, start=x.start, end=ends), replace(x, start=ends)]
+    return replace(
+        loop, system=replace(loop.system, components=components, connections=tuple(connections)), components=parts
+    )
+
+
+def _in_one(place: str) -> str:
+    """The name of what a message samples for it, as of a component."""
+    return place.replace(".", "/")
+
+
 class ScheduledLoop:
     """A loop that a computer or a network delays."""
 
@@ -57,9 +91,9 @@ class ScheduledLoop:
         """`loop` is that of the components of `system` without delays.
 
         Raises `UsageError` where there is no bound of their lateness, where a message may arrive after the next sample,
-        and for more than one delayed component.
+        and where more than two times vary at once.
         """
-        self._loop, self._system, self._cause = loop, system, cause
+        self._loop, self._system, self._cause = sampled_by_networks(loop, system), system, cause
         try:
             self.family(0.0)
         except UsageError as error:
@@ -80,18 +114,19 @@ class ScheduledLoop:
     def _timeline(self, value: float) -> tuple[LoopTimeline, list[float], float | None]:
         """The timeline, and the largest draws and their largest sum."""
         windows = self._windows(value)
-        timeline = LoopTimeline(replace(self._loop, system=self._earliest_system(windows)), self._varying(windows))
-        largest_sum = [window.together / NANOSECONDS for window in windows.values() if not window.is_certain]
-        return timeline, _widths(windows), largest_sum[0] if largest_sum else None
+        loop, draws = replace(self._loop, system=self._earliest_system(windows)), self._draws(windows)
+        varying = [Varying(kind=kind, name=name, path=self._cause.path) for (kind, name) in draws]
+        sums = [windows[name].together / NANOSECONDS for kind, name in draws if kind == LATENCY]
+        return LoopTimeline(loop, varying, self._latest(windows)), list(draws.values()), max(sums, default=None)
 
-    def _draws(self, value: float) -> Draws:
-        """The draws up to a value [s], of which the family takes long; raises `UsageError` where they are refused."""
+    def _pieces(self, value: float) -> object:
+        """What is drawn up to a value [s], of which the family takes long; raises `UsageError` where it is refused."""
         timeline, largest, largest_sum = self._timeline(value)
-        return timeline.draws(largest, largest_sum)
+        return timeline.pieces(largest, largest_sum)
 
     def largest(self) -> float:
         """The largest value for which there is a family [s]."""
-        largest = self._last(self._draws)
+        largest = self._last(self._pieces)
         return largest if not self.refusal(largest) else self._last(self.family)
 
     def _last(self, of: Callable[[float], object]) -> float:
@@ -116,36 +151,52 @@ class ScheduledLoop:
 
         def fails(value: float) -> bool:
             try:
-                widths = _widths(self._windows(value))
+                widths = list(self._draws(self._windows(value)).values())
             except UsageError:
                 return True
             return len(widths) > len(most) or (len(widths) == len(most) and any(a > b for a, b in zip(widths, most)))
 
+        def reads_more(value: float) -> bool:
+            return len(self.family(value).letters) > len(family.letters)
+
         found = bisected(fails, 0.0, self._cause.period, 0.5 / NANOSECONDS).good or 0.0
-        return min(floor_to_nanoseconds(found), self.largest())
+        found = min(floor_to_nanoseconds(found), self.largest())
+        if not reads_more(found):
+            return found
+        return floor_to_nanoseconds(bisected(reads_more, 0.0, found, 0.5 / NANOSECONDS).good or 0.0)
 
     def _windows(self, value: float) -> dict[str, Window]:
-        windows = windows_of(self._cause.with_draws_up_to(self._system, value))
-        late = [name for name, window in windows.items() if not window.is_certain]
-        if len(late) > 1:
-            raise UsageError(
-                f"{self._cause.path}: delays {', '.join(late)}; expected one delayed component, other tasks as load"
-            )
-        return windows
+        found = windows_of(self._cause.with_draws_up_to(self._system, value))
+        return {_in_one(name): window for name, window in found.items()}
 
-    def _varying(self, windows: Mapping[str, Window]) -> list[Varying]:
-        path = self._cause.path
-        return [
-            Varying(kind=kind, name=name, path=path)
-            for name, window in windows.items()
-            for kind in _draw_widths(window)
-        ]
+    def _draws(self, windows: Mapping[str, Window]) -> dict[tuple[str, str], float]:
+        """The widths of all draws [s], each from 0, by kind and name."""
+        found: dict[tuple[str, str], float] = {}
+        for name, window in windows.items():
+            kinds = {SHIFT if window.at_deadline else JITTER: window.shift}
+            if any(x.sender == name and not self._loop.is_sampled(x.receiver) for x in self._loop.system.connections):
+                kinds[LATENCY] = window.spread
+            found |= {(kind, name): width / NANOSECONDS for kind, width in kinds.items() if width}
+        return found
+
+    def _latest(self, windows: Mapping[str, Window]) -> dict[str, int]:
+        """By connection between sampled components, where it varies: the latest arrival after an earliest sample [ns].
+
+        The receiver only notices which message was the last one at its sample.
+        """
+        return {
+            x.name: math.ceil(window.end - window.earliest + exact_nanoseconds(lowest(x.delay)))
+            for x in self._loop.system.connections
+            for window in ([windows[x.sender]] if x.sender in windows else [])
+            if window.spread and self._loop.is_sampled(x.receiver)
+        }
 
     def _earliest_system(self, windows: Mapping[str, Window]) -> System:
         """The system of the loop, each component and message as early as possible."""
         components = dict(self._loop.system.components)
         for name, window in windows.items():
-            of_loop, task = components[name].sampling, self._system.components[name].sampling
+            of_loop = components[name].sampling
+            task = self._system.components[name].sampling if name in self._system.components else of_loop
             assert of_loop is not None
             assert task is not None
             offset = task.offset + window.earliest / NANOSECONDS * task.clock_ratio
@@ -161,15 +212,3 @@ def _least_delay(delay: Delay, window: Window) -> float:
     """The delay plus the least time between an earliest sample and its messages [s]."""
     least = window.least - (window.earliest if window.at_deadline else 0)
     return float(exact_nanoseconds(lowest(delay)) + least) / NANOSECONDS
-
-
-def _draw_widths(window: Window) -> dict[str, int]:
-    """The kinds of draws of a window, each from 0 to a width [ns]."""
-    shift = SHIFT if window.at_deadline else JITTER
-    widths = {shift: window.shift, LATENCY: window.spread}
-    return {kind: width for kind, width in widths.items() if width}
-
-
-def _widths(windows: Mapping[str, Window]) -> list[float]:
-    """The widths of all draws [s]."""
-    return [width / NANOSECONDS for window in windows.values() for width in _draw_widths(window).values()]

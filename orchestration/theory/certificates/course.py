@@ -3,7 +3,9 @@
 The state of the family has places for the numbers of the loop, and for the messages of each link in transit, by age.
 """
 
-from collections.abc import Callable, Sequence
+import functools
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +34,8 @@ class Jump:
     change: Floats
     before: tuple[int, ...]
     after: tuple[int, ...]
+    of: str | None = None
+    """Name of the component of which it is a sample"""
 
     def matrix(self, size: int) -> Floats:
         """The map of a whole state of `size` numbers."""
@@ -57,13 +61,16 @@ class Course(Piece):
 class RecordedEffects(ContinuousEffects):
     """The effects of events, which are recorded.
 
-    All messages of the connection `lossy` are lost while `loses`: they bring what was sent before instead.
+    All messages of the connection `lossy` are lost while `loses`: they bring what was sent before instead. What arrives
+    from an `unsure` connection waits: for the sample that reads it, or for the message after it.
     """
 
     loses = False
 
-    def __init__(self, system: System, components: Components, tasks: Sequence[str], lossy: str | None) -> None:
-        self._lossy = lossy
+    def __init__(
+        self, system: System, components: Components, tasks: Sequence[str], lossy: str | None, unsure: Collection[str]
+    ) -> None:
+        self._lossy, self._unsure = lossy, unsure
         super().__init__(system, components, tasks)
         self._slots: dict[tuple[int, int], int] = {}
         self.places_count = self.size
@@ -73,6 +80,8 @@ class RecordedEffects(ContinuousEffects):
         for x in self.system.connections:
             if x.name == self._lossy:
                 places.add("sent", x.name, len(x.start))
+            if x.name in self._unsure:
+                places.add("waiting", x.name, len(x.start))
 
     def start(self, in_transit: Sequence[int]) -> Course:
         """As `LoopEffects`."""
@@ -97,6 +106,27 @@ class RecordedEffects(ContinuousEffects):
             return np.eye(self.size)[self.places("sent", x.name)]
         return super()._message_rows(x)
 
+    def receive(self, piece: Piece, link: int, since: int, gap: int | None) -> Piece:
+        """As `LoopEffects`."""
+        x = self.system.connections[link]
+        if x.name not in self._unsure:
+            return super().receive(piece, link, since, gap)
+        leaves = slice(self.size, self.size + len(x.start))
+        change = self._read(len(piece.Z), x.name)
+        change[self.places("waiting", x.name)] = np.eye(len(piece.Z))[leaves]
+        return piece.mapped(np.delete(change, leaves, axis=0))
+
+    def _read(self, size: int, connection: str) -> Floats:
+        """The map by which what waits is read."""
+        change = np.eye(size)
+        change[self.places("received", connection)] = np.eye(size)[self.places("waiting", connection)]
+        return change
+
+    def having_read(self, jump: Jump, connection: str) -> Jump:
+        """A sample after it has read what waits."""
+        change = jump.change @ self._read(len(jump.before), connection)
+        return replace(jump, name=f"{jump.name} with {connection}", change=change)
+
     def done(self, piece: Piece, event: BranchEvent, in_transit: Sequence[int]) -> Piece:
         """As `LoopEffects`: its map is recorded."""
         assert isinstance(piece, Course)
@@ -105,6 +135,7 @@ class RecordedEffects(ContinuousEffects):
         jump = Jump(
             name=f"{subject} {VERBS[event.kind]}{lost}", change=piece.Z,
             before=self._places_with(piece.in_transit), after=self._places_with(in_transit),
+            of=subject if event.kind == "sample" else None,
         )  # fmt: skip
         return replace(self.start(in_transit), steps=(*piece.steps, jump))
 
@@ -128,6 +159,21 @@ PieceAt = Callable[[Point], Steps]
 """The steps of a piece of a period, by the values of draws"""
 
 
+Reading = tuple[str, int, str]
+"""A component, the number of its sample in a piece, and the connection from which it reads what waits"""
+
+
+def samples_in(steps: Steps) -> dict[tuple[str, int], int]:
+    """The times of samples from the begin of a piece [attoseconds], by component, and by their numbers."""
+    found, at = dict[tuple[str, int], int](), 0
+    for step in steps:
+        if isinstance(step, tuple):
+            at += step[0]
+        elif step.of is not None:
+            found[step.of, sum(name == step.of for name, _ in found)] = at
+    return found
+
+
 def time_at(time: Point, point: Point) -> int:
     """A time between events at values of the quantities."""
     return time[0] + sum(s * x for s, x in zip(time[1:], point))
@@ -136,17 +182,35 @@ def time_at(time: Point, point: Point) -> int:
 class Courses:
     """The courses of a period by the values of its draws, in pieces that begin at the same times."""
 
-    def __init__(self, loop: CertifiedLoop, timing: Timing, begins: Sequence[int], lossy: str | None) -> None:
+    def __init__(
+        self, loop: CertifiedLoop, timing: Timing, begins: Sequence[int], lossy: str | None, unsure: Collection[str]
+    ) -> None:
         self.begins, self._timing = begins, timing
         tasks, _ = timing(())
-        self._effects = RecordedEffects(loop.system, loop.components, [task.name for task in tasks], lossy)
+        self._effects = RecordedEffects(loop.system, loop.components, [task.name for task in tasks], lossy, unsure)
         self._known: dict[tuple[Point, bool], list[Steps]] = {}
         self._jumps: dict[str, Jump] = {}
         self._mode: Mode | None = None
 
-    def of(self, piece: int, *, lost: bool) -> PieceAt:
-        """A piece in which all messages are lost, or none."""
-        return lambda point: self._pieces(point, lost)[piece]
+    def of(self, piece: int, spread: Callable[[Point], Point], *, lost: bool) -> PieceAt:
+        """A piece in which all messages are lost, or none; `spread` has all values by those that it depends on."""
+        return lambda point: self._pieces(spread(point), lost)[piece]
+
+    def reading(self, of: PieceAt, reads: Collection[Reading]) -> PieceAt:
+        """A piece in which some samples first read what waits."""
+
+        def steps(point: Point) -> Steps:
+            found, counts = list[Jump | Point](), Counter[str]()
+            for step in of(point):
+                if isinstance(step, Jump) and step.of is not None:
+                    own = [x for name, k, x in reads if (name, k) == (step.of, counts[step.of])]
+                    counts[step.of] += 1
+                    found.append(functools.reduce(self._effects.having_read, sorted(own), step))
+                else:
+                    found.append(step)
+            return found
+
+        return steps
 
     def _pieces(self, point: Point, lost: bool) -> list[Steps]:
         if (point, lost) not in self._known:
@@ -160,11 +224,11 @@ class Courses:
             ]
         return self._known[point, lost]
 
-    def product(self, steps: Steps) -> tuple[Factor, ...]:
-        """The factors of steps."""
+    def product(self, steps: Steps, spread: Callable[[Point], Point]) -> tuple[Factor, ...]:
+        """The factors of steps, their times by all values: `spread` has these by those that they depend on."""
         return tuple(
             Factor(matrix=self._name_of(step)) if isinstance(step, Jump)
-            else Factor(matrix="flow", times=(step[0] / ATTOSECONDS, *map(float, step[1:])))
+            else Factor(matrix="flow", times=(step[0] / ATTOSECONDS, *map(float, spread(step[1:]))))
             for step in steps
         )  # fmt: skip
 

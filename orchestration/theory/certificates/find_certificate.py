@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.theory.certificates.certificate import Cells, Certificate, Node
-from orchestration.theory.certificates.family import LoopFamily
+from orchestration.theory.certificates.family import Letter, LoopFamily
 from orchestration.theory.certificates.verify_certificate import NotProven, edges_of, verified
 
 RADIUS = 1e-6
@@ -68,7 +68,7 @@ def _prove(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int
         forms = forms_for(certificate, parts)
         if forms is None:
             return None
-        for refinement in REFINEMENTS[max(len(letter.ranges) for letter in family.letters)]:
+        for refinement in REFINEMENTS[max(map(_varying, family.letters))]:
             refined = replace(certificate, forms=forms, cells=tuple(_cells_of(family, labels, refinement)))
             try:
                 verified(refined)
@@ -87,14 +87,14 @@ def _prove(certificate: Certificate, parts: Sequence[Sequence[int]], labels: int
 
 def _cells_of(family: LoopFamily, labels: int, refinement: int) -> Iterator[Cells]:
     """The cells of each letter: labels of equal width along each parameter, each of as many cells."""
-    total = [sum(x.ranges[i][1] - x.ranges[i][0] for x in family.letters if len(x.ranges) > i) for i in (0, 1)]
+    total = [sum(high - low for low, high in along) for along in zip(*(x.ranges for x in family.letters))]
     first = 0
     for letter in family.letters:
-        count = len(letter.ranges)
+        count = _varying(letter)
         edges, own = [], np.zeros((), dtype=int)
         for i, (low, high) in enumerate(letter.ranges):
             share = (high - low) / total[i] if total[i] > 0.0 else 1.0
-            cells = SEARCHED ** (1.0 / count) * refinement * share / labels
+            cells = SEARCHED ** (1.0 / max(count, 1)) * refinement * share / labels
             each = max(1, math.ceil(cells - 1e-9))
             edges.append(tuple(np.linspace(low, high, labels * each + 1).tolist()) if high > low else (low, high))
             along = np.repeat(np.arange(labels), each) if high > low else np.zeros(1, dtype=int)
@@ -103,6 +103,11 @@ def _cells_of(family: LoopFamily, labels: int, refinement: int) -> Iterator[Cell
         _, numbers = np.unique(numbers, return_inverse=True)
         yield Cells(edges=tuple(edges), labels=tuple((numbers + first).tolist()))
         first += int(numbers.max()) + 1
+
+
+def _varying(letter: Letter) -> int:
+    """The number of parameters that vary in a letter."""
+    return sum(high > low for low, high in letter.ranges)
 
 
 def parts_of(family: LoopFamily) -> list[list[int]]:
@@ -188,7 +193,7 @@ def forms_for(certificate: Certificate, parts: Sequence[Sequence[int]]) -> Mappi
 def inequalities_of(certificate: Certificate) -> int:
     """The number of matrix inequalities of a search, or an upper bound of it."""
     labels = sum(len(set(cells.labels)) for cells in certificate.cells)
-    corners = sum(math.prod(map(len, cells.edges)) for cells in certificate.cells)
+    corners = sum(math.prod(len(set(edges)) for edges in cells.edges) for cells in certificate.cells)
     modes = max(len(letter.moves) for letter in certificate.family.letters)
     return int(modes * corners * labels**certificate.memory)
 

@@ -161,6 +161,10 @@ def margin(request: RequestLike, of: str, *, last: float | None = None, progress
         with share_reporter(progress, "certifying", steady=False) as report:
             return _of_cause(request, cause, report)
     varying = varying_of(request, of)
+    if varying.kind == LOSS and system_of(request).uses_scheduler:
+        raise UsageError(
+            f"--of {of}: losses have a proof without computers and networks; expected limit --of {of}, which flies them"
+        )
     expect_without_scheduler(request)
     most = MOST_LOST if last is None else last
     if varying.kind == LOSS and most not in range(1, MOST_LOST_GIVEN + 1):

@@ -115,9 +115,11 @@ class _Enclosures:
     def _corners(self, letter: Letter, box: Box) -> list[arb_mat]:
         beyond = None
         for i, (low, high) in enumerate(box):
+            if low == high:
+                continue
             bent = self._jet(letter, box, i)[2] * ((arb(high) - arb(low)) ** 2 / 8)
             beyond = bent if beyond is None else _sum_of_sizes(beyond, bent)
-        corners = [self._map(letter, corner) for corner in itertools.product(*box)]
+        corners = [self._map(letter, corner) for corner in dict.fromkeys(itertools.product(*box))]
         return corners if beyond is None else [_widened(M, beyond) for M in corners]
 
     def _map(self, letter: Letter, point: tuple[float, ...]) -> arb_mat:

@@ -107,10 +107,13 @@ def test_what_has_no_bound_is_rejected(control: Any, others: Any, computer: Any,
         window(control, others, computer)
 
 
-def test_messages_of_components_in_continuous_time_are_rejected() -> None:
+def test_messages_of_components_in_continuous_time_have_windows_of_their_own() -> None:
     measured = Message(connection="measurement", bytes=8, identifier=1, period=5 * MS)
-    with pytest.raises(UsageError, match=r"^networks\.bus\.messages\.y: .*which plant is not"):
-        window({}, messages={"y": measured})
+    found = windows_of(system({"period": 10 * MS, "execution": 2 * MS}, messages={"y": measured}))
+    assert found["controller"] == window({})
+    frame = found["networks.bus.messages.y"]
+    assert (frame.earliest, frame.latest, frame.at_deadline) == (0, 0, False)
+    assert frame.least == frame.most == frame.end > 0
 
 
 def drawn(random: np.random.Generator) -> System:

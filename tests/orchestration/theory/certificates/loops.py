@@ -97,22 +97,52 @@ def through_a_filter() -> CertifiedLoop:
     return CertifiedLoop(system=system, components=components, period=Fraction(10**9))
 
 
+def static(inputs: str, outputs: str, D: list[float]) -> SampledSystem:
+    """An output that is the sum of inputs by these factors."""
+    nothing, one = np.zeros((0, 0)), np.zeros((1, 0))
+    return SampledSystem(
+        inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=np.zeros((0, len(D))), C=one, D=np.array([D])
+    )
+
+
+def double_integrator() -> Continuous:
+    """Position and speed under a force."""
+    return Continuous(
+        inputs=("u",), outputs=("p", "v"), A=np.array([[0.0, 1.0], [0.0, 0.0]]), B=np.array([[0.0], [1.0]]),
+        C=np.eye(2), D=np.zeros((2, 1)),
+    )  # fmt: skip
+
+
+def behind_a_sensor() -> CertifiedLoop:
+    """A double integrator whose position a sensor sends four times a second, to a law that samples 0.3 s after each.
+
+    A message is under way for 0.02 s at least, the command for 0.1 s.
+    """
+    system = System(
+        stop_time=10.0,
+        components={
+            "plant": Component(fmu="plant.fmu", step=0.1),
+            "sensor": Component(fmu="sensor.fmu", sampling=Sampling(period=0.25)),
+            "law": Component(fmu="law.fmu", sampling=Sampling(period=1.0, offset=0.3)),
+        },
+        connections=(
+            Connection(name="position", start=("plant.p",), end=("sensor.p",)),
+            Connection(name="message", start=("sensor.s",), end=("law.s",), delay=0.02),
+            Connection(name="command", start=("law.u",), end=("plant.u",), delay=0.1),
+        ),
+    )
+    components: Components = {
+        "plant": double_integrator(), "sensor": static("p", "s", [1.0]), "law": static("s", "u", [-0.5])
+    }  # fmt: skip
+    return CertifiedLoop(system=system, components=components, period=Fraction(10**9))
+
+
 def cascade(*, late: float = 0.0, wait: float = 0.0) -> CertifiedLoop:
     """A double integrator under an outer law once a second, which is `late` and whose wish arrives after `wait`.
 
     An inner law samples four times a second; its command arrives 0.1 s later.
     """
 
-    def static(inputs: str, outputs: str, D: list[float]) -> SampledSystem:
-        nothing, one = np.zeros((0, 0)), np.zeros((1, 0))
-        return SampledSystem(
-            inputs=tuple(inputs), outputs=tuple(outputs), A=nothing, B=np.zeros((0, len(D))), C=one, D=np.array([D])
-        )
-
-    plant = Continuous(
-        inputs=("u",), outputs=("p", "v"), A=np.array([[0.0, 1.0], [0.0, 0.0]]), B=np.array([[0.0], [1.0]]),
-        C=np.eye(2), D=np.zeros((2, 1)),
-    )  # fmt: skip
     system = System(
         stop_time=10.0,
         components={
@@ -128,7 +158,7 @@ def cascade(*, late: float = 0.0, wait: float = 0.0) -> CertifiedLoop:
         ),
     )
     components: Components = {
-        "plant": plant, "outer": static("p", "w", [-0.9]), "inner": static("wv", "u", [1.8, -1.8])
+        "plant": double_integrator(), "outer": static("p", "w", [-0.9]), "inner": static("wv", "u", [1.8, -1.8])
     }  # fmt: skip
     return CertifiedLoop(system=system, components=components, period=Fraction(10**9))
 

@@ -233,6 +233,38 @@ def test_of_frames_before_the_command_the_jitter_is_certified(monkeypatch: pytes
     assert "no proof sought: " in found.verdict
 
 
+def with_measurements(period: float, identifier: int | None = None) -> System:
+    """That law, with messages of the plant that have their own clock: on a bus of their own, or on the same one."""
+    system = on_a_bus(offset=0.25)
+    bus, own = system.networks["bus"], Message(connection="measurement", bytes=8, identifier=3, period=period)
+    command = bus.messages["command"]
+    if identifier is not None:
+        messages = {"command": command, "own": replace(own, identifier=identifier)}
+        return replace(system, networks={"bus": replace(bus, messages=messages)})
+    alone = {"bus": replace(bus, messages={"command": command}), "field": replace(bus, messages={"own": own})}
+    return replace(system, networks=alone)
+
+
+@pytest.mark.parametrize("period", [0.125, 0.5, 1.0])
+def test_what_a_bus_measures_is_a_sample_of_its_own(period: float) -> None:
+    """Where no frame waits the map is that of the timetable."""
+    system = with_measurements(period)
+    own = scheduled_loop(linear_loop_of(request_of(system)), system, "networks.field.messages.own.jitter")
+    family = own.family(0.0)
+    (letter,) = family.letters
+    radius = np.abs(np.linalg.eigvals(family.at(letter))).max()
+    assert Loops(files_of(system).models).radius(system, agree=1e-9) == pytest.approx(radius**2, rel=1e-8)
+
+
+def test_of_a_law_whose_messages_share_a_bus_there_is_a_family() -> None:
+    """Of the measurement it is a choice whether a sample reads it, of the command a draw."""
+    system, cause = with_measurements(0.5, identifier=1), "networks.bus.messages.own.jitter"
+    own = scheduled_loop(linear_loop_of(request_of(system)), system, cause)
+    few, more = own.family(0.01), own.family(0.1)
+    assert 0.01 <= own.value_of(few) < 0.1 <= own.value_of(more) < own.largest() <= 0.5
+    assert len(few.letters) < len(more.letters)
+
+
 def test_a_loop_that_constant_execution_times_break_has_none() -> None:
     slow = on_a_computer(control={"period": 2.1})
     none = margin(slow, LOGGER)
@@ -247,14 +279,16 @@ def test_a_delay_of_what_a_scheduler_delays_is_refused_for_its_cause() -> None:
         margin(on_a_computer(), COMMAND)
     with pytest.raises(UsageError, match=r"^networks\.bus\.messages\.command: .* of the jitter of one"):
         margin(on_a_bus(), COMMAND)
+    with pytest.raises(UsageError, match=r"^of = connections\.command\.loss: .*; expected limit of conn"):
+        margin(on_a_computer(), "connections.command.loss")
     with pytest.raises(UsageError, match="as a cause"):
         margin_region(on_a_computer(), COMMAND, "connections.measurement.delay_jitter")
 
 
-def test_two_components_that_are_late_are_refused() -> None:
+def test_where_too_many_times_vary_at_once_the_components_are_named() -> None:
     system = example("three_servos")
     at_ease = {f"computers.node.tasks.{name}.execution": 0.0005 for name in ("slow", "middle", "fast")}
-    with pytest.raises(UsageError, match=r"slow\.execution: delays slow, middle; expected one delayed component"):
+    with pytest.raises(UsageError, match=r"slow\.execution: 4 times of slow and middle vary at once, of 2 at most"):
         margin(changed(system, at_ease), "computers.node.tasks.slow.execution")
 
 
