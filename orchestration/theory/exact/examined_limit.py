@@ -1,4 +1,4 @@
-"""Limits of systems with computers or networks, by exact radii at values at which their schedule repeats."""
+"""Limits by exact radii at values that can be examined, as those at which a schedule repeats soon."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -57,8 +57,8 @@ def by_examined(
     """The limit, between the values that can be examined; None: none of the scan can.
 
     It is the upper end of the values from the system's own on, and the lower one, too, if asked for. A value for which
-    `radius` raises `UsageError`, as of a schedule that does not repeat soon, is neither below 1 nor above: another is
-    sought, or the bracket remains as it is.
+    `radius` raises `UsageError`, as of a schedule that does not repeat soon, or of too many messages in transit, is
+    neither below 1 nor above: another is sought, or the bracket remains as it is.
     """
     tried, refused = dict[float, float](), dict[float, str]()
 
@@ -162,4 +162,4 @@ def _end_in_words(bracket: Bracket, refused: Mapping[float, str], span: Range, m
     between = any(min(good, bad) < value < max(good, bad) for value in refused)
     if between and abs(bad - good) > WIDTH * span.tolerance_at(bad):
         ends += ", between which no value was found that can be examined"
-    return f"{ends}, of values at which the schedule repeats soon: others may differ"
+    return f"{ends}, of values that can be examined: others may differ"

@@ -36,7 +36,7 @@ SECOND_MOMENTS = Moving("second moments", "are bounded", "grow without bound")
 def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
     """The first value of a quantity, up from the system's own, at which the mean-square radius of the loop is 1.
 
-    With computers or networks it is between values that can be examined, if not all can.
+    It is between values that can be examined, if not all can.
     """
     try:
         system = rested(varied.request)
@@ -57,7 +57,8 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
     try:
         return _root(radius, span, tried)
     except (UsageError, SimulatorError):
-        known = by_examined(radius, span, SECOND_MOMENTS, lower_too=False) if system.uses_scheduler else None
+        can_go_on = bool(tried) or system.uses_scheduler
+        known = by_examined(radius, span, SECOND_MOMENTS, lower_too=False) if can_go_on else None
         if known is None:
             raise
         return known

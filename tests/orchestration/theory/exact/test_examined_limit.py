@@ -67,13 +67,32 @@ def test_before_a_value_that_is_stable_by_itself_the_first_that_can_be_examined_
 def test_a_mean_square_limit_goes_on_beside_values_that_cannot_be_examined(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mean_square, "changed", lambda system, values: values["period"])
     loops: Any = SimpleNamespace(radius=lambda value, *, agree: radius(value))
-    system: Any = SimpleNamespace(uses_scheduler=True)
+    system: Any = SimpleNamespace(uses_scheduler=False)
     span = Range(**{**vars(SPAN), "own": 0.005, "also": (0.007391,)})
     found = mean_square._crossing(system, ["period"], span, loops)
     assert found.limit == pytest.approx(0.007705, abs=1e-5)
     assert found.lower is None
     assert found.reason.startswith("second moments are bounded at 7.7 ms and grow without bound at 7.71 ms, of values")
     assert "not examined: 7.391 ms" in found.reason
+
+
+def test_second_moments_are_bounded_up_to_the_last_value_that_could_be_examined(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of a jitter: from 8 ms on too many messages are in transit."""
+    monkeypatch.setattr(mean_square, "changed", lambda system, values: values["jitter"])
+
+    def radius(value: float, *, agree: float) -> float:
+        if value > 0.0075:
+            raise UsageError("too many messages")
+        return 0.9
+
+    found = mean_square._crossing(Any, ["jitter"], SPAN, SimpleNamespace(radius=radius))  # type: ignore[arg-type]
+    assert found.limit is None
+    assert found.reason == (
+        "second moments are bounded at each value examined, 2 ms to 7 ms; not examined: 8 ms, 9 ms, 10 ms, as 8 ms "
+        "for: too many messages"
+    )
 
 
 GAIN, EXECUTION = 3.0 - 3.0**0.5, 0.2
