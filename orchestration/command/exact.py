@@ -51,7 +51,7 @@ def warn_if_means_are_infinite(request: "Request") -> None:
 def _lines(expected: "Expected") -> list[str]:
     fourth = expected.fourth_moment_radius
     texts = {
-        **{name: "-" if value is None else f"{value:.12g}" for name, value in expected.objectives.items()},
+        **{name: "-" if value is None else expected.shown(value, 12) for name, value in expected.objectives.items()},
         "mean_square_radius": f"{expected.mean_square_radius:.12g} in {expected.period:g} s",
         "fourth_moment_radius": "-" if fourth is None else f"{fourth:.12g}",
         "accuracy": f"{expected.accuracy:.1g} of each",

@@ -57,12 +57,17 @@ class Expected:
         radius = f"mean-square radius {shown} in {quantity(self.period, 's')}"
         if self.horizon is None and self.mean_square_radius >= 1.0:
             return f"no mean of squares is finite: {radius}"
-        known = [f"{name} = {value:.4g}" for name, value in self.objectives.items() if value is not None]
+        known = [f"{name} = {self.shown(value, 4)}" for name, value in self.objectives.items() if value is not None]
         means = "stationary" if self.horizon is None else f"from 0 to {quantity(self.horizon, 's')}"
         return f"{some(known) if known else 'no objective has an exact expectation'} ({means}); {radius}"
 
+    def shown(self, value: float, most: int) -> str:
+        """A value with the digits that the accuracy vouches for, of so many at most."""
+        digits = math.floor(-math.log10(self.accuracy)) if self.accuracy > 0.0 else most
+        return f"{value:.{min(max(digits, 1), most)}g}"
+
     def __repr__(self) -> str:
-        listed = ", ".join(f"{name} {'-' if v is None else f'{v:.6g}'}" for name, v in self.objectives.items())
+        listed = ", ".join(f"{name} {'-' if v is None else self.shown(v, 6)}" for name, v in self.objectives.items())
         radius, _ = told_apart(self.mean_square_radius, 1.0)
         return f"<Expected: {listed or 'no objectives'}; mean-square radius {radius}>"
 

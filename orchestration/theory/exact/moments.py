@@ -24,6 +24,8 @@ MAX_FOURTH_PRODUCTS = 1e8
 """products to propagate fourth moments over a period"""
 MOST_DOUBLINGS = 60
 """Most doublings of the number of periods in a sum"""
+MOST_PERIODS, SUMMED = 1000, 1e-14
+"""Periods in a sum, and the share of it at which what they add ends"""
 PASSES, MOST_VECTORS = 4, 400
 """Vectors of a Krylov basis by the size of the state, and at most"""
 DENSE = 1200
@@ -188,9 +190,22 @@ class JumpLinear:
             of_mean = self._basis.numbers([_geometric_sum(self._mean_map, first[0])])
             return self._basis.matrices(solve_fixed_point(self._by_chance(1.0), of_mean))
         if self.numbers > DENSE:
-            return self._basis.matrices(solve_fixed_point(self._propagate, added, _vectors(self._basis)))
+            return self._basis.matrices(self._sum_over_periods(added))
         operator = np.array([self._propagate(unit) for unit in np.eye(self.numbers)]).T
         return self._basis.matrices(np.linalg.solve(np.eye(self.numbers) - operator, added))
+
+    def _sum_over_periods(self, added: Floats) -> Floats:
+        """The moments that are added in each period, after all periods: by their sum, or near a radius of 1 solved for.
+
+        In a Krylov basis they need not converge where a plant has states of very different sizes; the sum does.
+        """
+        if self.radius**MOST_PERIODS > SUMMED:
+            return solve_fixed_point(self._propagate, added, _vectors(self._basis))
+        found = added
+        while np.linalg.norm(added) > SUMMED * (1.0 - self.radius) * np.linalg.norm(found):
+            added = self._propagate(added)
+            found = found + added
+        return found
 
     def costs(self) -> Floats:
         """The stationary costs of a period, shape (costs,)."""

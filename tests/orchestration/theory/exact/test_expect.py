@@ -218,6 +218,23 @@ def test_a_run_with_noise_that_leaves_what_is_linear_puts_the_expectation_in_dou
     assert "has a mean(plant.x ** 2) of more than 0.1 times the expected" in expect(system).doubt
 
 
+def test_what_is_shown_has_the_digits_that_the_accuracy_vouches_for() -> None:
+    known = Expected(
+        objectives={"cost": 8.06196e-06}, reasons={}, mean_square_radius=0.9, fourth_moment_radius=None, accuracy=1e-11,
+        method="", period=1.0,
+    )  # fmt: skip
+    for accuracy, text in (
+        (0.0, "8.062e-06"),
+        (1e-11, "8.062e-06"),
+        (0.002, "8.1e-06"),
+        (0.05, "8e-06"),
+        (2.0, "8e-06"),
+    ):
+        found = dataclasses.replace(known, accuracy=accuracy)
+        assert found.verdict.startswith(f"cost = {text} (stationary)")
+        assert found.shown(8.06196e-06, 4) == text
+
+
 def as_simulated(**changes: Any) -> float:
     settings = {key.replace("__", "."): value for key, value in changes.items()}
     found = expect(example("minimum_variance", settings), as_simulated=True).objectives["variance"]
