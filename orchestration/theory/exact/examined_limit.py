@@ -161,5 +161,5 @@ def _end_in_words(bracket: Bracket, refused: Mapping[float, str], span: Range, m
     ends = f"{moving.what} {moving.below} at {span.text(good)} and {moving.above} at {span.text(bad)}"
     between = any(min(good, bad) < value < max(good, bad) for value in refused)
     if between and abs(bad - good) > WIDTH * span.tolerance_at(bad):
-        ends += ", between which no value was found that can be examined"
+        return f"{ends}, between which no value was found that can be examined: others may differ"
     return f"{ends}, of values that can be examined: others may differ"

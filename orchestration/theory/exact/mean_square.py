@@ -36,7 +36,7 @@ SECOND_MOMENTS = Moving("second moments", "are bounded", "grow without bound")
 def mean_square_limit(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
     """The first value of a quantity, up from the system's own, at which the mean-square radius of the loop is 1.
 
-    It is between values that can be examined, if not all can.
+    It is between values that can be examined, if not all can; farther apart than the tolerance, they are all it says.
     """
     try:
         system = rested(varied.request)
@@ -61,6 +61,8 @@ def _crossing(system: System, paths: Sequence[str], span: Range, loops: Loops) -
         known = by_examined(radius, span, SECOND_MOMENTS, lower_too=False) if can_go_on else None
         if known is None:
             raise
+        if known.limit is not None and (known.accuracy or 0.0) > span.tolerance_at(known.limit):
+            return LinearLimit(reason=known.reason)
         return known
 
 

@@ -95,6 +95,19 @@ def test_second_moments_are_bounded_up_to_the_last_value_that_could_be_examined(
     )
 
 
+def test_between_values_too_far_apart_there_is_no_mean_square_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mean_square, "changed", lambda system, values: values["jitter"])
+
+    def radius(value: float, *, agree: float) -> float:
+        if 0.0075 < value < 0.0085:
+            raise UsageError("too many messages")
+        return 0.9 if value < 0.008 else 1.1
+
+    found = mean_square._crossing(Any, ["jitter"], SPAN, SimpleNamespace(radius=radius))  # type: ignore[arg-type]
+    assert found.limit is None
+    assert "bounded at 7 ms and grow without bound at 9 ms, between which no value was found" in found.reason
+
+
 GAIN, EXECUTION = 3.0 - 3.0**0.5, 0.2
 LIMIT = 2.0 / GAIN + 2.0 * EXECUTION
 """Period [s] from which on small deviations grow, of x⁺ = x - (h - τ) K x - τ K x⁻, which oscillates there"""
