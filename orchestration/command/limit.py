@@ -1,5 +1,6 @@
 """The command `limit`."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -73,10 +74,14 @@ def limit(
 
     how = "auto" if engine == "auto" else engine_named(engine, "auto")
     request = request_from(scenario, flags, timing)
-    found = limit_of(
-        request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
-        continuous=continuous, workers=workers, engine=how or "auto",
-    )  # fmt: skip
+    afterwards = None
+    try:
+        found = limit_of(
+            request, of, first=first, last=last, tolerance=tolerance, scan=scan, confidence=confidence,
+            continuous=continuous, workers=workers, engine=how or "auto",
+        )  # fmt: skip
+    except limit_result.LimitInterrupted as stop:
+        found, afterwards = stop.result, partial(_raise, stop)
     where = out or (None if scenario is None else scenario.parent)
     if figures and where is not None:
         from orchestration.experiments.limits.figure import draw_limit
@@ -88,4 +93,8 @@ def limit(
     if shares := limit_result.shares_as_text(found):
         lines += ["", *in_columns(shares)]
     lines += [f"note: {text}" for text in found.notes]
-    return CommandResult(document=found, verdict=found.verdict, lines=lines)
+    return CommandResult(document=found, verdict=found.verdict, lines=lines, afterwards=afterwards)
+
+
+def _raise(stop: BaseException) -> None:
+    raise stop

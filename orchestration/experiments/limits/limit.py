@@ -7,7 +7,7 @@ from typing import Literal
 
 from orchestration.components.fmi.foreign_calls import LostError, isolated_call
 from orchestration.experiments.limits.evaluation import RELIABILITY, Evaluator
-from orchestration.experiments.limits.limit_result import ContinuousRun, Limit
+from orchestration.experiments.limits.limit_result import ContinuousRun, Limit, LimitInterrupted
 from orchestration.experiments.limits.notes import notes_of
 from orchestration.foundation.basics.bisection import Bracket, Range, bisected, ends_of_good, first_failure
 from orchestration.foundation.basics.errors import UsageError
@@ -61,7 +61,8 @@ def limit(
     nothing fails before the end of the scan, `announce` with the choice of the engine and a line for each evaluated
     value, by default beside the bar; None for silence.
 
-    Raises `UsageError` for an invalid quantity, range, tolerance, step or confidence.
+    Raises `UsageError` for an invalid quantity, range, tolerance, step or confidence; `KeyboardInterrupt` after Ctrl-C:
+    once all is measured, its `result` is the limit without what theory has not found yet.
     """
     loop, execution = single_run_execution(request_of(request), engine)
     of = of or default_quantity(loop)
@@ -104,13 +105,26 @@ def limit(
         ideal = _continuous_run(near, pool) if near is not None else None
         report(1.0)
     failed = tuple(value for value, one in trials.tried.items() if not one.is_good)
-    with share_reporter(progress, "limits by linear theory"):  # without shares, as it ends where the limit is
-        local = _by_theory("local", files, local_limits, varied, replace(span, also=failed), models)
-        mean_square = _mean_square(varied, span, files, local) if random else LinearLimit()
+    local, mean_square = (
+        LinearLimit(reason="no local limit: interrupted before the limits by linear theory"),
+        LinearLimit(),
+    )
+    is_interrupted = False
+    try:
+        shown: Literal["bar"] | None = (
+            "bar" if progress == "bar" else None
+        )  # no other can be called from the process of the FMUs
+        local = _by_theory("local", files, local_limits, varied, replace(span, also=failed), models, shown)
+        if random:
+            mean_square = LinearLimit(reason="no mean-square limit: interrupted before it was found")
+            with share_reporter(shown, "mean-square limit"):
+                mean_square = _mean_square(varied, span, files, local)
+    except KeyboardInterrupt:
+        is_interrupted = True
     missed_from = _missed_from(varied, span, trials.scheduled)
     metric = trials.judged_at(next((one.bad for one in (bracket, lower) if one is not None), None))
     tried = trials.measuring(metric)
-    return Limit(
+    found = Limit(
         of=of, unit=span.unit, judged=metric, judged_unit=units.get(metric or ""),
         judged_bound=None if metric is None else bound_of(varied.system, metric),
         local_limit=local.limit, local_limit_outside=local.outside, local_method=local.method,
@@ -127,6 +141,9 @@ def limit(
         continuous=ideal, tried=tried,
         notes=tuple(notes_of(trials, models, bracket, refuted, local, mean_square, missed_from, metric)),
     )  # fmt: skip
+    if is_interrupted:
+        raise LimitInterrupted("before all limits by linear theory were found", found)
+    return found
 
 
 def _missed_from(varied: Varied, span: Range, values: Sequence[float]) -> float | None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 from orchestration.experiments.limits.evaluation import Evaluation
 from orchestration.foundation.basics.bisection import DIGITS, step_in_words
 from orchestration.foundation.basics.extras import explains_missing
+from orchestration.foundation.basics.interrupt import Interrupted
 from orchestration.foundation.basics.unit_algebra import quantity, some
 from orchestration.simulation.results import html
 
@@ -170,6 +171,14 @@ class Limit:
         import pandas as pd
 
         return pd.DataFrame([vars(one) for one in self.tried])
+
+
+class LimitInterrupted(Interrupted):
+    """Ctrl-C, once all is measured: this `result` is without what theory has not found yet."""
+
+    def __init__(self, text: str, result: Limit) -> None:
+        super().__init__(text)
+        self.result = result
 
 
 _ALWAYS = ("local_limit", "large_signal_limit")

@@ -217,7 +217,7 @@ class SearchResult:
             return f"a single generation of {self.evaluations} evaluations: no search yet"
         end = f"the last third of {self.evaluations} evaluations"
         if self.lowered == 0.0:
-            return f"{end} found no lower one"
+            return f"{end} found no lower one, though there may be one near by"
         further = ": more may lower it further" if self.lowered > CONVERGED else ""
         return f"{end} lowered it by {100.0 * self.lowered:.2g} %{further}"
 

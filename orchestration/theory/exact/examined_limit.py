@@ -7,6 +7,7 @@ from typing import NamedTuple
 from orchestration.components.fmi.read_description import Model
 from orchestration.foundation.basics.bisection import Bracket, Range
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.terminal import ShareProgress, share_reporter
 from orchestration.foundation.basics.unit_algebra import some
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.system.model import System
@@ -37,7 +38,9 @@ class Moving(NamedTuple):
 DEVIATIONS = Moving("small deviations", "decay", "grow")
 
 
-def local_limits(varied: Varied, span: Range, models: Mapping[str, Model]) -> LinearLimit:
+def local_limits(
+    varied: Varied, span: Range, models: Mapping[str, Model], progress: ShareProgress = None
+) -> LinearLimit:
     """As in `stability`; where the loop has no fixed periods, by exact radii instead of twin runs."""
 
     def examined(at: Callable[[float], System], span: Range) -> LinearLimit | None:
@@ -48,7 +51,8 @@ def local_limits(varied: Varied, span: Range, models: Mapping[str, Model]) -> Li
 
         return by_examined(radius, span)
 
-    return local_limit.local_limits(varied, span, examined)
+    with share_reporter(progress, "limits by linear theory") as report:
+        return local_limit.local_limits(varied, span, examined, report)
 
 
 def by_examined(

@@ -10,6 +10,7 @@ from itertools import groupby, takewhile
 from orchestration.components.fmi.reuse import Instances
 from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good
 from orchestration.foundation.basics.errors import SimulatorError, UsageError
+from orchestration.foundation.basics.terminal import Share
 from orchestration.foundation.basics.unit_algebra import some
 from orchestration.simulation.requests.ranges import Varied
 from orchestration.systems.schedule.overload import overloads
@@ -40,27 +41,37 @@ AGREE = 0.1
 NEAR = 0.1
 """Distance from the limit at which it has to, relative"""
 
+NARROWING = 6
+"""Values that it takes to narrow a bracket of several rates, about"""
+
 Growth = Callable[[float], float]
 """Growth rate of small deviations by the value of the quantity [1/s]"""
 Examined = Callable[[Callable[[float], System], Range], LinearLimit | None]
 """Another way to the limit of a system with computers or networks; None: it has no value there, either"""
 
 
-def local_limits(varied: Varied, span: Range, examined: Examined | None = None) -> LinearLimit:
+def local_limits(
+    varied: Varied, span: Range, examined: Examined | None = None, report: Share = lambda share: None
+) -> LinearLimit:
     """The local limit of a quantity, through saved states where the FMUs have them, else by perturbed twin runs.
 
     With computers or networks by `examined` before twin runs, which a schedule that repeats late misleads. A kind of
-    request in `LOOPS` has its own method.
+    request in `LOOPS` has its own method. `report` is called where the share that is done is known.
     """
     known = LOOPS.of(varied.request.kind)
     if known is not None:
         return known.local_limits(varied, span)
     if not varied.system.operating_point:
         return LinearLimit(reason="no local limit: the system file names no operating_point")
-    return about_rest(varied.at, span, examined)
+    return about_rest(varied.at, span, examined, report)
 
 
-def about_rest(at: Callable[[float], System], span: Range, examined: Examined | None = None) -> LinearLimit:
+def about_rest(
+    at: Callable[[float], System],
+    span: Range,
+    examined: Examined | None = None,
+    report: Share = lambda share: None,
+) -> LinearLimit:
     """The local limit of any system; `at` makes the system for a value of the quantity."""
     try:
         if deterministic(at(span.first)) == deterministic(at(span.last)):
@@ -69,7 +80,7 @@ def about_rest(at: Callable[[float], System], span: Range, examined: Examined | 
                 "quantisation, where this quantity changes nothing"
             )
         with closing(Instances()) as instances:
-            return _through_saved_states(at, span, instances)
+            return _through_saved_states(at, span, instances, report)
     except (NotAnEquilibriumError, ImpreciseError) as error:
         return LinearLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
@@ -86,7 +97,9 @@ def about_rest(at: Callable[[float], System], span: Range, examined: Examined | 
     return replace(found, method=f"{TWINS}{code} (no spectral radius: {why})")
 
 
-def _through_saved_states(at: Callable[[float], System], span: Range, instances: Instances) -> LinearLimit:
+def _through_saved_states(
+    at: Callable[[float], System], span: Range, instances: Instances, report: Share
+) -> LinearLimit:
     """Its accuracy includes the effect of another pulse size."""
     growths, known = dict[float, float](), _known_at_own(at, span, instances)
 
@@ -94,14 +107,14 @@ def _through_saved_states(at: Callable[[float], System], span: Range, instances:
         growths[value] = found = growth_of_loop(at(value), instances, known=known)
         return found
 
-    rates = commensurate(at, span.values())
-    found = _first_growth(growth, span, LOOP, None) if rates is None else _first_tried(growth, span, rates)
+    rates = commensurate(at, replace(span, also=()).values(), also=span.also)
+    found = _first_growth(growth, span, LOOP, None) if rates is None else _first_tried(growth, span, rates, report)
     code = of_code(are_in_double({name: one for name, (one, _, _) in known.items()}))
     found = replace(found, method=f"{LOOP}{code}")
     limit = found.limit
     if limit is None or found.accuracy is None:
         return found
-    near = min(growths, key=lambda value: abs(value - limit))
+    near = min(growths if rates is None else rates.scan, key=lambda value: abs(value - limit))
     difference = abs(growth_of_loop(at(near), instances, OTHER_PULSE, known) - growths[near])
     return replace(found, accuracy=found.accuracy + uncertainty(growths, limit, difference))
 
@@ -218,7 +231,7 @@ def _naming_values(growth: Growth, span: Range) -> Growth:
     return named
 
 
-def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimit:
+def _first_tried(growth: Growth, span: Range, rates: Commensurate, report: Share) -> LinearLimit:
     """The first value at which small deviations grow, up and down from the system's own, and all that were found."""
     if not rates.scan:
         return LinearLimit(reason="no local limit: several rates, which repeat together at no value of the scan")
@@ -227,6 +240,7 @@ def _first_tried(growth: Growth, span: Range, rates: Commensurate) -> LinearLimi
     def kept(value: float) -> float:
         if value not in tried:
             tried[value] = growth(value)
+            report(min(1.0, len(tried) / (len(rates.scan) + NARROWING)))
         return tried[value]
 
     for value in rates.longest_first:

@@ -91,6 +91,8 @@ class Start:
     """Parameters, as COMPONENT.NAME, that may be set between steps"""
     tuned: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
     """Those that components take on there, as they had others when they came to rest"""
+    is_retimed: bool = True
+    """Whether such are periods that follow those of their components: no other rest is to be expected"""
 
     @classmethod
     def of(cls, simulation: "PreparedRun", saved: Mapping[str, bytes]) -> "Start":
@@ -117,14 +119,20 @@ class Start:
         if system.components.keys() != self.components.keys():
             return None
         components, saved, tuned = dict[str, Component](), dict(self.saved), dict[str, Mapping[str, Parameter]]()
+        is_retimed = True
         for name, one in self.components.items():
             old, new = one.parameters, system.components[name].parameters
             components[name] = replaced(one, parameters=new)
             if old != new:
                 tuned[name] = {key: value for key, value in new.items() if old.get(key) != value}
+                is_retimed &= all(
+                    _is_period(old.get(key), one) and _is_period(new[key], system.components[name])
+                    for key in tuned[name]
+                )
                 if old.keys() - new.keys() or not self.tunable.issuperset(f"{name}.{key}" for key in tuned[name]):
                     del saved[name]
-        found = replace(self, components=components, saved=saved, tuned=tuned)
+                    is_retimed = False
+        found = replace(self, components=components, saved=saved, tuned=tuned, is_retimed=is_retimed)
         return found if found.serves(system) else None
 
     def serves(self, system: System) -> bool:
@@ -133,6 +141,10 @@ class Start:
 
     def _untimed(self, components: Mapping[str, Component]) -> dict[str, Component]:
         return {name: one if name in self.ticking else _untimed(one) for name, one in components.items()}
+
+
+def _is_period(value: Parameter | None, one: Component) -> bool:
+    return one.sampling is not None and value == one.sampling.period
 
 
 def _untimed(one: Component) -> Component:
@@ -323,7 +335,10 @@ def _settled(
         )
         saved = {name: one.save() for name, one in simulation.instances.items()}
         if time_to_rest(calm):
-            known.start = Start.of(simulation, saved) if start is None else start
+            if start is None:
+                known.start = Start.of(simulation, saved)
+            elif start is not near:
+                known.start = start
         yield AtRest(simulation=simulation, saved_states=saved, extra=extra, period=period, known=known)
 
 
@@ -333,14 +348,21 @@ def _found(
     near: Start | None,
     corrected: Callable[[Start], Start],
 ) -> tuple[PreparedRun, Start | None]:
-    """A run at rest, and where it has begun: near by, if that differs in timing only, None: by itself, or corrected."""
-    if near is not None and not near.tuned:
+    """A run at rest, and where it has begun: near by, if that differs in timing only, None: by itself, or corrected.
+
+    What differs in timing only has no other rest near by: from there its own is computed before it is sought by a run.
+    """
+    is_retimed = near is not None and near.is_retimed
+    if near is not None and is_retimed:
         with suppress(NotAnEquilibriumError):
             return stack.enter_context(rested(near)), near
+        with suppress(UsageError, SimulatorError):
+            start = corrected(near)
+            return stack.enter_context(rested(start)), start
     try:
         return stack.enter_context(rested(None)), None
     except NotAnEquilibriumError:
-        if near is not None:
+        if near is not None and not is_retimed:
             with suppress(UsageError, SimulatorError):
                 start = corrected(near)
                 return stack.enter_context(rested(start)), start
@@ -364,6 +386,7 @@ def _corrected(calm: System, period: Fraction, instances: Instances, known: Know
         balance(components, calm.connections)
     return replace(
         near,
+        components=simulation.system.components,
         saved={one.name: (one.state.saved, one.state.time, ones[one.name].taken) for one in components},
         held={one.name: {**near.held[one.name], **dict(zip(one.inputs, one.held.tolist()))} for one in components},
         tuned={},

@@ -50,7 +50,7 @@ def in_words(z: complex) -> str:
     """A pole of the z-plane, with its conjugate."""
     size = abs(z.imag)
     digits = ".4f" if size >= 1e-4 else ".2g"
-    return f"{z.real:.4f}" + (f" ± {size:{digits}}j" if size > REAL else "")
+    return f"{round(z.real, 4) + 0.0:.4f}" + (f" ± {size:{digits}}j" if size > REAL else "")
 
 
 def or_alias(turn: float | None) -> str:

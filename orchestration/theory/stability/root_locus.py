@@ -160,9 +160,12 @@ class RootLocus:
             ]
             known += f"; no poles at {some(reasons, '; at ')}"
         if self.asked is not None:
-            known += f"; {self.tried} values tried, at which all rates repeat together"
+            known += f"; {self.tried} values examined, at which all rates repeat together"
             known += " after twenty times the longest period at most"
-            known += f": {self.moved} of {self.asked} are moved to {len(self.values)}" if self.moved else ""
+            known += (
+                f": of {self.asked} asked for {self.moved} are no such, others near by stand in" if self.moved else ""
+            )
+            known += "; stable or unstable windows between values examined are not seen"
         begins = "inside" if self.radius[0] < 1.0 else "not all inside"
         if not self.crossings:
             radii = f"spectral radius {self.radius.min():.4g} to {self.radius.max():.4g}"

@@ -17,8 +17,10 @@ from orchestration.theory.stability.operating_point import (
 )
 from orchestration.theory.stability.periodic_schedule import begin_and_hyperperiod, instants
 
-MOST_MULTIPLES = 200
+MOST_MULTIPLES = 120
 """Most multiples of the other periods that are tried beside the values of the scan"""
+FEW = 2
+"""Of it after which the others meet such a multiple again, at most: what takes longer takes long to examine"""
 MOST_BETWEEN = 10_000
 """Most values between two others that are looked at, those of the simplest ratios"""
 DIGITS, ROUNDING = 6, 1e-12
@@ -87,9 +89,18 @@ class Meetings:
             share *= 2.0
         return min(near, key=lambda one: abs(one - value), default=math.nan)
 
+    def has(self, value: float) -> bool:
+        """Whether a value is one."""
+        return self.period_with(value) <= LONGEST_HYPERPERIOD * max(self._longest, self._period_of(value))
+
     def period_with(self, value: float) -> Fraction:
         """The hyperperiod of a value and the others [ns]."""
         return hyperperiod([self._whole, self._period_of(value)])
+
+    def few_of(self, values: Sequence[float]) -> list[float]:
+        """Those, `MOST_MULTIPLES` at most, whose hyperperiod with the others is `FEW` of them at most."""
+        found = [value for value in values if self.period_with(value) <= FEW * self._period_of(value)]
+        return found[:: math.ceil(len(found) / MOST_MULTIPLES) or 1]
 
     def _ratio_of(self, value: float) -> tuple[int, Fraction]:
         period = self._period_of(value)
@@ -100,14 +111,17 @@ class Meetings:
 
 
 def commensurate(
-    at: Callable[[float], System], values: Sequence[float], *, instead: bool = False
+    at: Callable[[float], System], values: Sequence[float], *, also: Sequence[float] = (), instead: bool = False
 ) -> Commensurate | None:
     """The values at which a loop of several rates repeats; None: it has one rate, or the quantity is no period.
 
-    `instead`: one in the place of each value, and no multiples of the others between them; of what shares a
-    processor or a network others are then all that does.
+    `also`: values that are taken as multiples of the others are, if they meet these soon. `instead`: one in the place
+    of each value, and no multiples of the others between them. Of what shares a processor
+    or a network others are all that does.
     """
-    is_shared = instead and instants(at(values[0])) != instants(at(values[-1]))
+    is_shared = instants(at(values[0])) != instants(at(values[-1]))
+    if not instead and beside_others(at, values[0], values[-1]) is None:
+        return None
     beside = beside_others(at, values[0], values[-1], _with_shared if is_shared else periods_of)
     if beside is None:
         return None
@@ -123,7 +137,7 @@ def commensurate(
             value: hyperperiod_of(system)
             for value in sorted(some)
             for system in [at(value)]
-            if not is_shared or _is_scheduled(system)
+            if not is_shared or ((instead or meetings.has(value)) and _is_scheduled(system))
         }
         return {value: period for value, period in each.items() if period is not None}
 
@@ -133,9 +147,8 @@ def commensurate(
         known = repeating({*given, *filter(math.isfinite, instead_of)})
         moved = len(values) - len(given)
     else:
-        added = sorted({value for period in others for value in multiples(period)})
-        few = added[:: math.ceil(len(added) / MOST_MULTIPLES)] if added else added
-        known, moved = repeating({*values, *few}), 0
+        added = sorted({*also, *(value for period in others for value in multiples(period))})
+        known, moved = repeating({*values, *meetings.few_of(added)}), 0
     longest_first = sorted(known, key=known.__getitem__, reverse=True)
     return Commensurate(scan=[*known], longest_first=longest_first, meetings=meetings, moved=moved)
 

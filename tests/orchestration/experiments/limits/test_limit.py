@@ -19,7 +19,7 @@ from orchestration.components.fmi.reuse import Instances
 from orchestration.experiments.limits import limit as limits
 from orchestration.experiments.limits import notes
 from orchestration.experiments.limits.evaluation import is_good
-from orchestration.experiments.limits.limit_result import ContinuousRun, as_text, shares_as_text
+from orchestration.experiments.limits.limit_result import ContinuousRun, LimitInterrupted, as_text, shares_as_text
 from orchestration.foundation.basics.bisection import Bracket, Ends, Range, ends_of_good, first_failure
 from orchestration.foundation.basics.simulator import Floats
 from orchestration.foundation.basics.statistics import wilson
@@ -578,7 +578,7 @@ def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
 ) -> None:
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.078 else 1.0)
     assert "within a tenth of the local limit" in "\n".join(limits.limit(scenario_of(), "period").notes)
-    monkeypatch.setattr(limits, "local_limits", lambda varied, span, models: LinearLimit(limit=0.07, accuracy=0.01))
+    monkeypatch.setattr(limits, "local_limits", lambda *given: LinearLimit(limit=0.07, accuracy=0.01))
     note = limits.limit(scenario_of(), "period").notes[-1]
     assert note.endswith("not told apart from the local limit, which is 70 ms ± 10 ms")
 
@@ -587,7 +587,7 @@ def test_a_limit_within_a_tenth_of_the_local_limit_is_noted(
 def test_a_limit_as_coarse_as_its_tolerance_is_not_said_to_be_below_the_local_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(limits, "local_limits", lambda varied, span, models: LinearLimit(limit=0.06))
+    monkeypatch.setattr(limits, "local_limits", lambda *given: LinearLimit(limit=0.06))
     note = limits.limit(scenario_of(), "period", first=0.02, scan=0.06, tolerance=0.06).notes[-1]
     assert note.endswith("within a tenth of the local limit of 60 ms, to the tolerance")
 
@@ -617,12 +617,12 @@ def test_a_limit_names_the_lowest_value_at_which_deadlines_are_missed() -> None:
 def test_linear_theory_tries_the_values_at_which_runs_fail(
     stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def theory(varied: Varied, span: Range, models: object) -> LinearLimit:
+    def theory(varied: Varied, span: Range, *_: object) -> LinearLimit:
         return LinearLimit(limit=span.values()[span.values().index(0.035) - 1])
 
     monkeypatch.setattr(limits, "local_limits", theory)
     assert 0.0317 < (limits.limit(scenario_of(), "period", first=0.03, scan=0.005).local_limit or 0.0) < 0.035
-    monkeypatch.setattr(limits, "local_limits", lambda varied, span, models: LinearLimit(limit=0.031))
+    monkeypatch.setattr(limits, "local_limits", lambda *given: LinearLimit(limit=0.031))
     monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.0334 else 1.0)
     note = limits.limit(scenario_of(), "period", first=0.03, scan=0.005).notes[-1]
     assert note.endswith("31 ms, from which on small motions grow: a run of 30 s does not show slow growth")
@@ -898,3 +898,17 @@ def test_invalid_requests_are_refused_before_any_run(
     with pytest.raises(UsageError, match=expected):
         limits.limit(scenario_of(), **{"of": "period", **options})
     assert stubbed.systems == []
+
+
+def test_after_an_interruption_of_the_theory_the_flown_limit_remains_with_what_is_missing(
+    stubbed: type[StubPool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*given: object) -> LinearLimit:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(limits, "local_limits", stopped)
+    monkeypatch.setattr(stubbed, "bound", lambda self, system: 0.01 if at(system, "timing.period") < 0.0334 else 1.0)
+    with pytest.raises(LimitInterrupted, match="before all limits by linear theory were found") as stop:
+        limits.limit(scenario_of(), "period")
+    assert stop.value.result.large_signal_limit == pytest.approx(0.033, abs=5e-4)
+    assert "no local limit: interrupted before the limits by linear theory" in stop.value.result.notes

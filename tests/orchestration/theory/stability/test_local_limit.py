@@ -9,6 +9,7 @@ import pytest
 from orchestration.foundation.basics.bisection import Range
 from orchestration.foundation.basics.errors import UsageError
 from orchestration.systems.system.component import Component, Sampling
+from orchestration.systems.system.computers import Computer, Task
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import local_limit, several_rates
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError, hyperperiod_of
@@ -159,3 +160,34 @@ def test_a_period_among_several_rates_has_no_limit_beyond_a_value_that_is_unstab
     assert none.reason.startswith("local: small deviations grow at none, of 15 values from 50 ms to 150 ms")
     monkeypatch.setattr(several_rates, "hyperperiod_of", lambda system: None)
     assert "at no value of the scan" in local_limit.about_rest(two, SPAN).reason
+
+
+def test_beside_tasks_that_share_a_processor_few_values_are_examined_at_which_their_schedule_repeats_soon(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def shared(period: float) -> System:
+        periods = {"law": period, "servo": 2e-4}
+        tasks = {
+            name: Task(component=name, period=each, execution=1e-5, priority=k)
+            for k, (name, each) in enumerate(periods.items())
+        }
+        node = Computer(tasks={**tasks, "comms": Task(period=0.002, execution=1e-4, priority=2)})
+        return System(
+            stop_time=9.0, components={name: Component(fmu=f"{name}.fmu") for name in periods}, computers={"node": node}
+        )
+
+    tried = list[float]()
+
+    def growth(system: System, *_: Any, **__: Any) -> float:
+        tried.append(float(system.computers["node"].tasks["law"].period))
+        return tried[-1] - 0.0202
+
+    monkeypatch.setattr(local_limit, "growth_of_loop", growth)
+    shares = list[float]()
+    span = Range(own=0.002, first=0.001, step=0.001, last=0.03, tolerance=1e-4, also=(0.0203125, 0.0204))
+    found = local_limit.about_rest(shared, span, report=shares.append)
+    assert found.limit == pytest.approx(0.0202, abs=1e-4)
+    assert {0.0203125, 0.0204}.isdisjoint(tried)
+    assert len(tried) < 60, "not at all 146 multiples of 0.2 ms"
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.8

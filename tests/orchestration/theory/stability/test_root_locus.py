@@ -127,7 +127,7 @@ def test_a_period_beside_another_crosses_between_two_that_coincide_with_it() -> 
     assert [(one.value, one.until, one.leaves) for one in others] == [(0.013, 0.0128, False), (0.013, 0.0132, True)]
     assert (crossing.value, crossing.until, crossing.leaves) == (0.0125, 0.0128, True)
     assert "leave between 12.5 ms and 12.8 ms; return between 12.8 ms and 13 ms; leave" in found.verdict
-    assert f"{found.tried} values tried, at which all rates repeat together" in found.verdict
+    assert f"{found.tried} values examined, at which all rates repeat together" in found.verdict
     stable, unstable = (
         linearise(changed(both, {period: value}), "controller") for value in (crossing.value, crossing.until)
     )

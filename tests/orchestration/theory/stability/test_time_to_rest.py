@@ -15,6 +15,7 @@ from orchestration.foundation.basics.simulator import Floats
 from orchestration.systems.system.model import System
 from orchestration.systems.system.paths import changed, value_at
 from orchestration.theory.exact.expect import expect
+from orchestration.theory.stability import loop_at_rest
 from orchestration.theory.stability.fixed_periods import in_repeated_periods
 from orchestration.theory.stability.loop_at_rest import KnownTangents, keep_start
 from orchestration.theory.stability.period_map import growth_of_loop
@@ -58,6 +59,30 @@ def test_an_integral_without_a_parameter_comes_to_rest_by_a_run_and_has_the_pole
     found = np.array([one.z for one in loop.poles])
     assert loop.radius == pytest.approx(np.abs(expected).max(), abs=1e-8)
     assert all(np.abs(expected - one).min() < 1e-7 for one in found)
+
+
+def test_a_period_that_a_parameter_follows_begins_where_the_own_one_has_come_to_rest(
+    servo: System, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    law = servo.components["controller"]
+    law = dataclasses.replace(law, parameters={**law.parameters, "period": "sampling.period"})
+    follows = dataclasses.replace(servo, components={**servo.components, "controller": law})
+    own, begun = loop_at_rest._rested, list[bool]()
+
+    def seen(*given: Any) -> Any:
+        begun.append(given[-1] is not None)
+        return own(*given)
+
+    monkeypatch.setattr(loop_at_rest, "_rested", seen)
+    with closing(Instances()) as instances:
+        known = KnownTangents()
+        keep_start(follows, instances, known)
+        for period in (0.005, 0.0055, 0.005):
+            other = changed(follows, {"components.controller.sampling.period": period})
+            assert growth_of_loop(other, instances, known=known) == pytest.approx(
+                growth_of_loop(other, instances), rel=1e-5
+            )
+    assert begun == [False, *(True, False) * 3]
 
 
 def test_other_delays_begin_where_the_own_one_has_come_to_rest_also_where_the_loop_is_unstable(servo: System) -> None:
