@@ -20,7 +20,7 @@ from orchestration.theory.stability.periodic_schedule import begin_and_hyperperi
 MOST_MULTIPLES = 120
 """Most multiples of the other periods that are tried beside the values of the scan"""
 FEW = 2
-"""Of it after which the others meet such a multiple again, at most: what takes longer takes long to examine"""
+"""Number of them at most after which the others meet it again: what takes longer takes long to examine"""
 MOST_BETWEEN = 10_000
 """Most values between two others that are looked at, those of the simplest ratios"""
 DIGITS, ROUNDING = 6, 1e-12
