@@ -179,7 +179,7 @@ def test_beside_tasks_that_share_a_processor_few_values_are_examined_at_which_th
     tried = list[float]()
 
     def growth(system: System, *_: Any, **__: Any) -> float:
-        tried.append(float(system.computers["node"].tasks["law"].period))
+        tried.append(system.computers["node"].tasks["law"].period or 0.0)
         return tried[-1] - 0.0202
 
     monkeypatch.setattr(local_limit, "growth_of_loop", growth)
