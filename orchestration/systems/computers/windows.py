@@ -58,7 +58,7 @@ class Window:
 
 
 def windows_of(system: System) -> dict[str, Window]:
-    """The windows of the components that run on a computer or send over a network, by component.
+    """The windows of the components that run on a computer, send over a network or have jitter, by component.
 
     Messages that sample a component in continuous time have their own, by their places. Raises `UsageError` where there
     is no bound, where a job or frame may still be under way when the next one comes, and for a task without a period.
@@ -80,7 +80,7 @@ def windows_of(system: System) -> dict[str, Window]:
             raise UsageError(f"{over[0].place}: expected all that {name} sends in one connection")
         if task is not None:
             found[name] = _of_task(task, bounds)
-        elif over and sampling is not None:
+        elif over or highest(sampling.jitter):
             found[name] = _of_clock(nanoseconds(highest(sampling.jitter)))
         if over:
             found[name] = _with_frame(found[name], over[0], bounds)

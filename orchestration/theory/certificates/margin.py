@@ -43,10 +43,13 @@ from orchestration.theory.stability.delay_bounds import SampledLoop, certain_jit
 from orchestration.theory.stability.in_double import are_in_double, of_code
 from orchestration.theory.stability.known_loops import rested, warned_of_timing
 from orchestration.theory.stability.loop_at_rest import at_rest
+from orchestration.theory.stability.operating_point import inform_of_chance
 from orchestration.theory.stability.scheduled import without_scheduler
 
 MOST_LOST, MOST_LOST_GIVEN = 8, 16
 """Losses in a row that are considered, and that may be requested: sequences double with each"""
+ELSEWHERE = "a margin --of each has it alone, expect includes them in mean square"
+"""What includes that which a margin leaves out"""
 MOST_STATES = 40
 """states that act on one another for which a proof is sought"""
 _OPEN_AT_ONCE = "beyond, two draws would be open at once"
@@ -145,8 +148,9 @@ def margin(request: RequestLike, of: str, *, last: float | None = None, progress
 
     `of` is the path of a sampled component's `sampling.jitter`, of a connection's `delay_jitter`, or of its `loss`,
     which means the longest run of messages lost in a row; all else is without jitter. Of a system with computers or
-    networks it is that of a task's `execution`, or of the `jitter` of a task or message; the others vary as the file
-    allows. Values up to `last` are considered; by default 8 losses, and times as long as no two draws are open at once.
+    networks it is that of a task's `execution`, or of the `jitter` of a task or message; the others, and samples by
+    clocks of components, vary as the file allows. Values up to `last` are considered; by default 8 losses, and times as
+    long as no two draws are open at once.
     The result is about the linear loop, not about large errors.
 
     Raises `UsageError` where the loop has no linear form or the path is unsupported, saying why.
@@ -169,6 +173,7 @@ def margin(request: RequestLike, of: str, *, last: float | None = None, progress
     most = MOST_LOST if last is None else last
     if varying.kind == LOSS and most not in range(1, MOST_LOST_GIVEN + 1):
         raise UsageError(f"--to {most:g}: expected a number of losses in a row, from 1 to {MOST_LOST_GIVEN}")
+    inform_of_chance(system_of(request), but=[varying.path], includes=ELSEWHERE)
     loop = linear_loop_of(request)
     timeline = LoopTimeline(loop, [varying])
     with share_reporter(progress, "certifying", steady=False) as report:
@@ -320,6 +325,8 @@ def _of_losses(timeline: LoopTimeline, varying: Varying, most: int, progress: Sh
 
 def _of_cause(request: Request, cause: Cause, progress: Share) -> Certified:
     system, files = rested(request), files_of(system_of(request))
+    clocks = [f"components.{name}.sampling.jitter" for name in system.components]
+    inform_of_chance(system, but=clocks, includes=ELSEWHERE)
     with errors_in_own_terms(request):
         loop = linear_loop_of(request)
         scheduled = ScheduledLoop(loop, system, cause)

@@ -15,12 +15,14 @@ from orchestration.simulation.figures.palette import BLUE, RED
 from orchestration.simulation.figures.style import SCREEN, Style, save
 from orchestration.simulation.requests.request import RequestLike, request_of
 from orchestration.simulation.results import display_names as labels
+from orchestration.systems.system.request import system_of
 from orchestration.theory.certificates import margin
 from orchestration.theory.certificates.breaking import BreakingSequence, least_breaking, unstable_sequence
 from orchestration.theory.certificates.certified_loop import LOSS
 from orchestration.theory.certificates.family import LoopFamily
 from orchestration.theory.certificates.timeline import LoopTimeline
 from orchestration.theory.stability.in_double import are_in_double, of_code
+from orchestration.theory.stability.operating_point import inform_of_chance
 
 COLUMNS = 6
 """values of the first quantity, from 0 to the one that alone breaks the loop"""
@@ -103,6 +105,7 @@ def margin_region(
     if any(each.kind == LOSS for each in pair) or pair[0] == pair[1]:
         raise UsageError(f"--of {of} --and {and_of}: expected two different jitters or delay jitters")
     margin.expect_without_scheduler(request)
+    inform_of_chance(system_of(request), but=[each.path for each in pair], includes=margin.ELSEWHERE)
     timeline = LoopTimeline(margin.linear_loop_of(request), pair)
     if unstable_sequence(timeline.family([0.0, 0.0])) is not None:
         raise UsageError("the loop is unstable where nothing varies, so nothing can be certified")

@@ -1,7 +1,7 @@
 """A system at its operating point, without randomness, quantisation and floats of C, and whether it rests there."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -61,8 +61,13 @@ def _punctual(component: Component) -> Component:
     return replace(component, record=(), sampling=replace(component.sampling, jitter=0.0))
 
 
-def inform_of_chance(system: System) -> None:
-    """Say what `deterministic` leaves out of the times of a system, and what includes it."""
+def inform_of_chance(
+    system: System,
+    *,
+    but: Collection[str] = (),
+    includes: str = "expect includes them in mean square, margin in any sequence",
+) -> None:
+    """Say what chance is left out of the times of a system, `but` these paths, and what `includes` it."""
     varied = {
         f"connections.{x.name}": {"delay_jitter": x.delay_jitter, "loss": x.loss, "random delay": is_random(x.delay)}
         for x in system.connections
@@ -72,9 +77,12 @@ def inform_of_chance(system: System) -> None:
         for name, one in system.components.items()
         if one.sampling is not None
     }
-    each = {place: [key for key, value in values.items() if value] for place, values in varied.items()}
+    each = {
+        place: [key for key, value in values.items() if value and f"{place}.{key}" not in but]
+        for place, values in varied.items()
+    }
     if found := some(f"{' and '.join(keys)} of {place}" for place, keys in each.items() if keys):
-        inform(f"left out here: {found}; expect includes them in mean square, margin in any sequence")
+        inform(f"left out here: {found}; {includes}")
 
 
 def longest_period(system: System) -> Fraction:

@@ -116,6 +116,12 @@ def test_messages_of_components_in_continuous_time_have_windows_of_their_own() -
     assert frame.least == frame.most == frame.end > 0
 
 
+def test_a_component_beside_a_network_is_as_late_as_its_own_clock() -> None:
+    measured = Message(connection="measurement", bytes=8, identifier=1, period=5 * MS)
+    found = windows_of(system(None, messages={"y": measured}, sampling=Sampling(period=10 * MS, jitter=4 * MS)))
+    assert (found["controller"].earliest, found["controller"].latest, found["controller"].end) == (0, 4e6, 4e6)
+
+
 def drawn(random: np.random.Generator) -> System:
     """A controller among other tasks, in half of the systems with its command on a bus among other frames."""
 
