@@ -43,6 +43,8 @@ SLOWER = 0.03
 FREQUENCIES = 1500
 BESIDE_A_POLE = np.linspace(-4.0, 4.0, 17)
 """Further frequencies about that of a pole, in units of its damping"""
+MOST_SAMPLES = 20
+"""Samples of a component in the period of its loop, at most: the matrices over it grow with them"""
 BESIDE_A_TURN = 1e-4
 """Least distance of a frequency from whole turns in a period of several samples"""
 
@@ -68,7 +70,7 @@ def bode(request: RequestLike, component: str | None = None) -> Bode | Bodes:
             "of this stepped coupling; with shorter steps the margins may differ"
         )
     found = in_isolation(request, _bode, names)
-    return found[0] if len(names) == 1 else Bodes(components=dict(zip(names, found, strict=True)))
+    return found[names[0]] if len(names) == 1 else Bodes(components=found)
 
 
 def _cut_at(system: System, component: str | None) -> list[str]:
@@ -115,19 +117,33 @@ def expect_decided(loop: Linearised) -> None:
         )
 
 
-def _bode(request: Request, names: list[str]) -> tuple[Bode, ...]:
+def _bode(request: Request, names: list[str]) -> dict[str, Bode]:
     with errors_in_own_terms(request), closing(Instances()) as instances:
         system = rested(request)
         models = files_of(system).models_of(system)
         with progress_bar("margins") as report, whole_at_rest(system, instances, models=models) as rest:
-            found = list[Bode]()
+            found, refused = dict[str, Bode](), dict[str, UsageError]()
             for name in names:
-                found.append(_of_component(rest, name, system, lambda share: report((len(found) + share) / len(names))))
-            return tuple(found)
+                try:
+                    found[name] = _of_component(
+                        rest, name, system, lambda share: report((len(found) + len(refused) + share) / len(names))
+                    )
+                except UsageError as error:
+                    refused[name] = error
+            for error in refused.values():
+                if not found:
+                    raise error
+                inform(f"left out: {error}")
+            return found
 
 
 def _of_component(rest: AtRest, name: str, system: System, report: Share) -> Bode:
     loop, calm = cut_open(rest, name), rest.simulation.system
+    if loop.samples > MOST_SAMPLES:
+        raise UsageError(
+            f"{name} samples {loop.samples} times in the period of its loop, {quantity(loop.samples * loop.dt, 's')}; "
+            f"expected {MOST_SAMPLES} times at most"
+        )
 
     @cache
     def later(delay: float) -> StateSpace:

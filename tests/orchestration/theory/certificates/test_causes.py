@@ -90,7 +90,7 @@ def test_a_loggers_execution_is_certified_below_what_breaks_the_loop(found: Cert
     assert found.largest < 0.45
     assert found.unproved is not None
     assert found.certified < found.unproved < found.breaking
-    assert f"; no proof was found for {1e3 * found.unproved:.4g} ms, one of" in found.verdict
+    assert f"; no proof was found for {time_text(found.unproved)}, one of" in found.verdict
 
 
 def test_what_breaks_a_loop_does_so_where_it_is_run(found: Certified) -> None:

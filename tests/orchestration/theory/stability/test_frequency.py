@@ -373,6 +373,17 @@ def test_a_component_in_no_loop_is_left_out_and_refused_alone(capsys: pytest.Cap
         bode(beside, "logger")
 
 
+def test_a_component_of_too_many_samples_is_left_out_and_refused_alone(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(frequency, "MOST_SAMPLES", 1)
+    assert list(bode(in_cascade()).components) == ["controller"]
+    reason = "servo samples 2 times in the period of its loop, 6 ms; expected 1 times at most"
+    assert f"left out: {reason}" in capsys.readouterr().err
+    with pytest.raises(UsageError, match=f"^{reason}$"):
+        bode(in_cascade(), "servo")
+
+
 def test_the_command_prints_a_line_for_each_loop(main: Main, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(frequency, "bode", lambda *_: cascade())
     file = EXAMPLES / "dc_servo" / "system.toml"
