@@ -49,7 +49,7 @@ from orchestration.theory.stability.scheduled import without_scheduler
 MOST_LOST, MOST_LOST_GIVEN = 8, 16
 """Losses in a row that are considered, and that may be requested: sequences double with each"""
 ELSEWHERE = "a margin --of each has it alone, expect includes them in mean square"
-"""What includes that which a margin leaves out"""
+"""Commands that include chance which a margin leaves out"""
 MOST_STATES = 40
 """states that act on one another for which a proof is sought"""
 _OPEN_AT_ONCE = "beyond, two draws would be open at once"

@@ -130,10 +130,10 @@ def _bode(request: Request, names: list[str]) -> dict[str, Bode]:
                     )
                 except UsageError as error:
                     refused[name] = error
-            for error in refused.values():
+            for reason in refused.values():
                 if not found:
-                    raise error
-                inform(f"left out: {error}")
+                    raise reason
+                inform(f"left out: {reason}")
             return found
 
 
