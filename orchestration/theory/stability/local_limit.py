@@ -85,10 +85,10 @@ def about_rest(
         return LinearLimit(reason=f"no local limit: {error}")
     except (UsageError, SimulatorError) as error:
         why = str(error)
-    if commensurate(at, span.values()) is not None:
-        return LinearLimit(reason=f"no local limit: several rates, and no spectral radius: {why}")
     if examined is not None and at(span.last).uses_scheduler and (known := examined(at, span)) is not None:
         return replace(known, method=f"{known.method} (no spectral radius: {why})")
+    if commensurate(at, span.values()) is not None:
+        return LinearLimit(reason=f"no local limit: several rates, and no spectral radius: {why}")
     try:
         found = _by_twins(at, span)
     except (UsageError, SimulatorError) as error:

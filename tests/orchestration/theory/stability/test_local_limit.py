@@ -12,6 +12,7 @@ from orchestration.systems.system.component import Component, Sampling
 from orchestration.systems.system.computers import Computer, Task
 from orchestration.systems.system.model import System
 from orchestration.theory.stability import local_limit, several_rates
+from orchestration.theory.stability.known_loops import LinearLimit
 from orchestration.theory.stability.operating_point import NotAnEquilibriumError, hyperperiod_of
 from orchestration.theory.stability.perturbed_runs import Growth
 
@@ -191,3 +192,11 @@ def test_beside_tasks_that_share_a_processor_few_values_are_examined_at_which_th
     assert len(tried) < 60, "not at all 146 multiples of 0.2 ms"
     assert shares == sorted(shares)
     assert shares[-1] > 0.8
+
+    def refused(*_: Any, **__: Any) -> float:
+        raise UsageError("it repeats after 350 ms")
+
+    monkeypatch.setattr(local_limit, "growth_of_loop", refused)
+    beside = local_limit.about_rest(shared, span, lambda *_: LinearLimit(limit=0.02, method="by radii"))
+    assert (beside.limit, beside.method) == (0.02, "by radii (no spectral radius: it repeats after 350 ms)")
+    assert local_limit.about_rest(shared, span).reason.startswith("no local limit: several rates, and no spectral rad")
